@@ -14,7 +14,7 @@ from torch import nn
 
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.ops import HashGridSpec, PackedSamples, composite, hash_encode, march_rays, neus_weights
+from splitnerf.ops import HashGridSpec, PackedSamples, composite, hash_encode, march_rays
 from splitnerf.render.rays import image_rays
 from splitnerf_tools.demo.scene import write_demo_dataset
 
@@ -25,13 +25,12 @@ CENTRES = torch.stack(torch.meshgrid(AXIS, AXIS, AXIS, indexing="ij"), dim=-1).v
 
 
 def density_weights(density: torch.Tensor, samples: PackedSamples) -> tuple[torch.Tensor, torch.Tensor]:
-    """The samples' weights, with alpha = 1 - exp(-density length), and each ray's opacity.
-
-    `neus_weights` takes signed distances. Far inside of a surface its alpha is 1 - exp(f_next - f_prev).
-    """
-    f_prev = torch.full_like(density, -20)
-    f_next = f_prev - density * (samples.t_ends - samples.t_starts)
-    return neus_weights(f_prev, f_next, torch.ones(()), samples.offsets, 1e-4)
+    """The samples' weights, with alpha = 1 - exp(-density length), and each ray's opacity."""
+    depth = density * (samples.t_ends - samples.t_starts)
+    total = torch.cat([depth.new_zeros(1), depth]).double().cumsum(0)  # up to each sample, over all rays
+    before = (total[:-1] - total[samples.offsets[samples.ray_indices]]).to(depth)
+    weights = torch.exp(-before) * -torch.expm1(-depth)
+    return weights, composite(weights, torch.ones_like(weights)[:, None], samples.offsets)[:, 0]
 
 
 class NeRF(nn.Module):

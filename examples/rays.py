@@ -1,7 +1,5 @@
 """Renders the signed distance field of a sphere with NeuS weights: march along rays, weigh the samples, composite.
 
-The training estimates both ends of a sample from its middle (`surface_weights`); here both are known (`neus_weights`).
-
 Prints the depth's error against the exact intersection and writes the normals as a PNG: rays.py [FILE].
 """
 
@@ -10,7 +8,7 @@ import sys
 import torch
 
 from splitnerf.data.images import write_image
-from splitnerf.ops import CELL_OCCUPIED, composite, march_rays, neus_weights
+from splitnerf.ops import CELL_OCCUPIED, composite, march_rays, surface_weights
 
 SIZE, BOX, RESOLUTION, STEP = 160, 1.5, 64, 0.01
 
@@ -32,11 +30,12 @@ def main(path: str = "rays.png") -> None:
     samples = march_rays(rays_o, rays_d, torch.full((len(x),), 0.5), cells, BOX, STEP)
 
     o, d = rays_o[samples.ray_indices], rays_d[samples.ray_indices]
-    f_prev, f_next = sdf(o + d * samples.t_starts[:, None]), sdf(o + d * samples.t_ends[:, None])
-    weights, opacity = neus_weights(f_prev, f_next, torch.tensor(2000.0), samples.offsets)
-    middle = (samples.t_starts + samples.t_ends)[:, None] / 2
-    points = o + d * middle
-    depth, normals = composite(weights, torch.cat([middle, points], dim=1), samples.offsets).split([1, 3], dim=1)
+    middle = samples.middles[:, None]
+    points = o + d * middle  # on a sphere around the origin the gradient has their direction
+    normals, weights, opacity = surface_weights(
+        sdf(points), points / points.norm(dim=1, keepdim=True), rays_d, torch.tensor(2000.0), samples.offsets, step=STEP
+    )
+    depth, normals = composite(weights, torch.cat([middle, normals], dim=1), samples.offsets).split([1, 3], dim=1)
 
     inside = x * x + z * z < 0.9
     exact = 4 - torch.sqrt(1 - x * x - z * z)[inside]

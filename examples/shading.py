@@ -8,7 +8,7 @@ import sys
 import torch
 
 from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.ops import fibonacci_directions, prefilter_light, query_direction, split_sum_shade
+from splitnerf.ops import fibonacci_directions, light_queries, prefilter_light, split_sum_shade
 
 SIZE = 128
 
@@ -34,7 +34,7 @@ def shade(albedo: list[float], roughness: float, metallic: float) -> torch.Tenso
     one = torch.ones(len(normals), 1)
     lights = fibonacci_directions(8192, torch.Generator().manual_seed(0))
     light = sky(lights)
-    d = query_direction(normals, views, roughness * one)
+    d = light_queries(normals, views, roughness * one)[0][: len(normals)]
     specular = prefilter_light(d, roughness * one, lights, light)
     diffuse = prefilter_light(normals, one, lights, light)
     image = torch.ones(SIZE, SIZE, 3)

@@ -110,11 +110,6 @@ def neus_weights(f_prev, f_next, s, offsets, min_transmittance) -> tuple[Tensor,
     return weights, torch.zeros(len(counts), dtype=weights.dtype).index_add(0, rays, weights)
 
 
-def sharpness(variance: Tensor) -> Tensor:
-    """exp(10 v), with 10 v in [0, 9]."""
-    return torch.exp(torch.clamp(10 * variance, 0, 9))
-
-
 def surface_weights(
     sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples=-1
 ) -> tuple[Tensor, Tensor, Tensor]:
@@ -134,6 +129,10 @@ def composite(weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor 
     sums = torch.zeros(len(offsets) - 1, values.shape[1], dtype=values.dtype)
     sums = sums.index_add(0, ray_indices(offsets), weights[:, None] * values)
     return sums if opacity is None else sums / opacity.clamp(min=least)[:, None]
+
+
+def interpolate(values: Tensor, first: Tensor, second: Tensor, share: Tensor) -> Tensor:
+    return torch.lerp(values[first], values[second], share[:, None])
 
 
 # ---- shading ----
@@ -156,12 +155,16 @@ def facing(normals: Tensor, view_dirs: Tensor) -> tuple[Tensor, Tensor]:
     return torch.where(cosine < 0, -normals, normals), cosine.abs()
 
 
-def query_direction(normals, view_dirs, roughness, lut, mean) -> Tensor:
-    """The mirrored view, or the mean direction of the lobe around it."""
+def light_queries(normals, view_dirs, roughness, lut, mean) -> tuple[Tensor, Tensor]:
+    """The mirrored view, or the mean direction of the lobe around it, with the roughness; then the normal with 1."""
     normals, cosine = facing(normals, view_dirs)
-    mirror = 2 * cosine * normals - view_dirs
-    if not mean:
-        return mirror
+    lobes = 2 * cosine * normals - view_dirs
+    if mean:
+        lobes = mean_direction(normals, cosine, lobes, roughness, lut)
+    return torch.cat([lobes, normals]), torch.cat([roughness, torch.ones_like(roughness)])
+
+
+def mean_direction(normals: Tensor, cosine: Tensor, mirror: Tensor, roughness: Tensor, lut: Tensor) -> Tensor:
     t = ((roughness - 0.3) / 0.1).clamp(0, 1)
     k = 1 + t * t * (3 - 2 * t) * (brdf_table(lut, cosine, roughness)[:, 2:3] - 1)
     return F.normalize((1 - k) * normals + k * mirror, dim=1)
@@ -236,6 +239,48 @@ def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) 
     weights = torch.stack(parts, 1)
     share = torch.where(pdf > 0, 1 / (light_dirs.shape[1] * pdf), 0)
     return weights @ (radiance * share[..., None])
+
+
+def drawn_directions(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, share: float, n_samples: int, seed: int = 0
+) -> tuple[Tensor, Tensor]:
+    """Directions [n, k, 3] and their densities [n, k]: a share by the visible normals, then the rest by the cosine.
+
+    Either part is a lattice with a random shift for each point; the density is that of both parts together.
+
+    Source: Heitz 2018; Dupuy and Benyoub 2023 (visible normals); Veach 1997 (balance heuristic).
+    """
+    generator, golden = torch.Generator().manual_seed(seed), (5**0.5 - 1) / 2
+    normals, _ = facing(normals, view_dirs)
+    tangent = F.normalize(torch.linalg.cross(normals, normals.roll(1, 1) * torch.tensor([1.0, -1.0, 1.0]).to(normals)), dim=1)
+    frame = torch.stack([tangent, torch.linalg.cross(normals, tangent), normals], 2)  # its columns are the axes
+    view, alpha = (view_dirs[:, None] @ frame), (roughness**2).clamp(min=2e-3)[..., None]
+
+    def lattice(count: int) -> tuple[Tensor, Tensor]:
+        steps = torch.arange(count, dtype=normals.dtype)
+        first, second = torch.rand(2, len(normals), 1, generator=generator, dtype=normals.dtype)
+        return torch.frac((steps + 0.5) / max(count, 1) + first), 2 * math.pi * (steps * golden + second)
+
+    def around(height: Tensor, angle: Tensor) -> Tensor:
+        radius = (1 - height**2).clamp(min=0).sqrt()
+        return torch.stack([radius * angle.cos(), radius * angle.sin(), height], -1)
+
+    count = round(share * n_samples)
+    u, angle = lattice(count)
+    stretched = F.normalize(torch.cat([alpha * view[..., :2], view[..., 2:]], -1), dim=-1)
+    cap = around((1 - u) * (1 + stretched[..., 2]) - stretched[..., 2], angle) + stretched
+    half = F.normalize(torch.cat([alpha * cap[..., :2], cap[..., 2:].clamp(min=0)], -1), dim=-1)
+    mirrored = 2 * (view * half).sum(-1, keepdim=True) * half - view
+    u, angle = lattice(n_samples - count)
+    local = torch.cat([mirrored, around(u.sqrt(), angle)], 1)
+
+    a2, n_v = alpha[..., 0] ** 2, view[..., 2].clamp(min=1e-4)
+    apart = F.normalize(local + view, dim=-1) - torch.tensor([0.0, 0.0, 1.0]).to(local)
+    apart = apart.square().sum(-1)
+    d = a2 / (math.pi * (a2 + (1 - a2) * apart * (1 - apart / 4)) ** 2)
+    visible = d / (2 * (n_v + (a2 + (1 - a2) * n_v**2).sqrt()))
+    density = count / n_samples * visible + (1 - count / n_samples) * local[..., 2] / math.pi
+    return local @ frame.transpose(1, 2), torch.where(local[..., 2] > 0, density, 0)
 
 
 def summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent) -> Tensor:
@@ -421,20 +466,6 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple
     apart = (there - here).square().sum(1)
     counts = weights[beside] * (apart.detach() < 2)
     return eikonal, (counts * torch.sqrt(apart + 1e-24)).sum() / counts.sum().clamp(min=1e-8)
-
-
-def material_losses(albedo, metallic, shares, smooth_l1: bool) -> tuple[Tensor, Tensor, Tensor]:
-    """Weighted means of m^2 (or its smooth L1), m (1 - m), and m times the darkness of the albedo."""
-    m, shares = metallic[:, 0], shares / shares.sum()
-    metal = F.smooth_l1_loss(m, torch.zeros_like(m), reduction="none") if smooth_l1 else m.square()
-    darkness = (1 - albedo.detach().amax(1) / 0.4).clamp(min=0)
-    return shares @ metal, shares @ (m * (1 - m)), shares @ (m * darkness)
-
-
-def log_chroma(radiance: Tensor) -> Tensor:
-    """Mean squared distance of the log channels from their mean."""
-    log_light = torch.log(radiance + 1e-6)
-    return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
 
 def light_prior(texels: Tensor, level_sizes: list[int]) -> Tensor:

@@ -10,7 +10,7 @@
 //              Memory: 204 bytes a point, 8 MB, 2.4 us on an H100, 1.7 us on an H200. The gathers, from the L2 cache, are 512 bytes
 //              a point, 20 MB, and up to 160 MB in sectors of 32 bytes, 29 us, where no two of a point's neighbours meet.
 //   backward   40,000 operations a point, 1.6 GFLOP: 26 to 31 us; memory as above, and 3 MB of blocks' sums. But 5.0 million pairs
-//              are added to the table, for which hash_encode_jacobian's own backward took 110 us on an H100: this is the limit.
+//              are added to the table, for which the gradient of an encoding with its Jacobian alone took 110 us on an H100: this is the limit.
 //
 // So tensor cores are not what is missing, and in TF32 inputs near 1.5 would be off by 7e-4, which normals at s = 300 show. A block
 // takes 99 kB of shared memory forward and 93 kB backward, so that two share a processor; 610 tiles are 2.3 rounds of 264 blocks.

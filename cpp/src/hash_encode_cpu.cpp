@@ -21,44 +21,42 @@ HashEncodeArgs<T> make_args(const HashGridShape& shape, HashLevel* levels, int n
 }  // namespace
 
 template <class T>
-void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, HashTable table, T* features,
-                 T* jacobian) {
+void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, HashTable table,
+                 T* features) {
   std::array<HashLevel, kMaxLevels> levels;
   hash_levels(shape, levels.data());
   const auto args = make_args(shape, levels.data(), n_active, n, positions, table);
   const Kernels<T>& k = kernels<T>();
-  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) { k.hash_encode(args, begin, end, features, jacobian); });
+  parallel_for(n, kGrain, [&](int64_t begin, int64_t end) { k.hash_encode(args, begin, end, features, nullptr); });
 }
 
 template <class T>
 void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                          const T* grad_features, const T* grad_jacobian, T* grad_table) {
+                          const T* grad_features, T* grad_table) {
   std::array<HashLevel, kMaxLevels> levels;
   hash_levels(shape, levels.data());
   const auto args = make_args<T>(shape, levels.data(), n_active, n, positions, nullptr);
   const Kernels<T>& k = kernels<T>();
-  for_each_level(args, grad_table,
-                 [&](int level) { k.hash_scatter(args, level, grad_features, grad_jacobian, grad_table); });
+  for_each_level(args, grad_table, [&](int level) { k.hash_scatter(args, level, grad_features, grad_table); });
 }
 
 template <class T>
 void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                                    HashTable table, const T* grad_features, const T* grad_jacobian,
-                                    T* grad_positions) {
+                                    HashTable table, const T* grad_features, T* grad_positions) {
   with_features(shape.n_features, [&](auto count) {
     table.read_as<T>([&](auto* entries) {
       using S = Pointee<decltype(entries)>;
       const auto grid = make_view<T>(shape, n_active, positions, entries);
-      run(n, HashPositionsBody<T, decltype(count)::n, S>{grid, grad_features, grad_jacobian, grad_positions});
+      run(n, HashPositionsBody<T, decltype(count)::n, S>{grid, grad_features, grad_positions});
     });
   });
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                     \
-  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, HashTable, T*, T*);                     \
-  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, const T*, T*);       \
+  template void hash_encode<T>(const HashGridShape&, int, int64_t, const T*, HashTable, T*);                         \
+  template void hash_encode_backward<T>(const HashGridShape&, int, int64_t, const T*, const T*, T*);                 \
   template void hash_encode_backward_positions<T>(const HashGridShape&, int, int64_t, const T*, HashTable, const T*, \
-                                                  const T*, T*);
+                                                  T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)
 #undef SPLITNERF_INSTANTIATE

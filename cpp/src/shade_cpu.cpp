@@ -20,7 +20,6 @@ template void run<double>(int64_t, const ShadeBody<double>&);
 template <class T> void run(int64_t n, const ShadeBackwardBody<T>& b) {
   parallel_for(n, kGrain, [&](int64_t begin, int64_t end) {
     kernels<T>().split_sum_shade_backward(b.lut, b.options, begin, end, b.n_channels, b.in, b.grad_radiance, b.grad);
-    for (int64_t i = begin; i < end; ++i) b.add_more(i);
   });
 }
 template void run<float>(int64_t, const ShadeBackwardBody<float>&);

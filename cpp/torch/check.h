@@ -90,12 +90,6 @@ inline Tensor checked(const char* op, const char* name, const Tensor& t, std::in
   return aligned ? dense : torch::stable::clone(dense);
 }
 
-// The same of a tensor that need not be there.
-inline std::optional<Tensor> checked_if(const char* op, const char* name, const std::optional<Tensor>& t,
-                                        std::initializer_list<int64_t> shape, Kind kind) {
-  return t ? std::optional(checked(op, name, *t, shape, kind)) : std::nullopt;
-}
-
 // The floating dtype and the device that an operator computes in: those of its first tensor.
 inline Kind real_kind(const char* op, const char* name, const Tensor& t) {
   const ScalarType type = t.scalar_type();

@@ -23,7 +23,7 @@ namespace splitnerf::glue {
   X(hash_encode_backward)                                                                                              \
   X(hash_encode_backward_positions)                                                                                    \
   X(prefilter_light) X(prefilter_light_backward) X(light_lookup_backward) X(spread_samples) X(sdf_values) X(sdf_field) \
-      X(sdf_field_backward) X(sample_rays) X(shared_light_backward) X(material_network) X(material_network_backward)
+      X(sdf_field_backward) X(sample_rays) X(shared_light_backward)
 
 // What an operator asks of a device. The first argument names the operator in errors of a GPU; scratch memory lives until the
 // call of on_device ends.

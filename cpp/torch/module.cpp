@@ -9,7 +9,6 @@
 #include "bindings_photos.h"
 #include "bindings_scene.h"
 #include "splitnerf/environment.h"
-#include "splitnerf/gather_rate.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/kernels.h"
 #include "splitnerf/losses.h"
@@ -97,21 +96,6 @@ PYBIND11_MODULE(_core, m) {
   m.def(
       "cuda_architectures", [] { return SPLITNERF_CUDA_ARCHITECTURES; },
       "The GPU architectures that the operators were built for; empty for a build without CUDA.");
-
-  m.def(
-      "random_gathers",
-      [](const py::array_t<float, py::array::c_style>& table, int64_t n) {
-        const py::ssize_t entries = table.ndim() == 2 && table.shape(1) == 2 ? table.shape(0) : 0;
-        int log2_entries = 0;
-        while (log2_entries < 31 && (py::ssize_t(1) << log2_entries) < entries) ++log2_entries;
-        if (log2_entries < 1 || (py::ssize_t(1) << log2_entries) != entries || n < 0)
-          throw py::value_error("random_gathers: table must be [2^k, 2], k = 1 ... 31, and n not negative");
-        py::gil_scoped_release release;
-        return splitnerf::random_gathers(table.data(), log2_entries, n);
-      },
-      py::arg("table"), py::arg("n"),
-      "Reads n entries of a [2^k, 2] float32 table in pseudo-random order and returns their sum: the machine's gather "
-      "limit.");
 
   bind_light(m);
   bind_mesh(m);

@@ -1,4 +1,4 @@
-// A step of AdamW as torch operators that write to their arguments: of one parameter, and of many in one launch.
+// A step of AdamW of many parameters in one launch, as a torch operator that writes to its arguments.
 #include <optional>
 #include <vector>
 
@@ -70,19 +70,6 @@ Tensor dense_gradient(const char* op, const Tensor& grad, const Tensor& param, c
   return torch::stable::contiguous(grad);
 }
 
-void adamw_step(Tensor param, Tensor grad, Tensor exp_avg, Tensor exp_avg_sq, double lr, double beta1, double beta2,
-                double eps, double weight_decay, int64_t step, bool sparse, std::optional<Tensor> copy) {
-  const char* op = "adamw_step_";
-  const Kind kind = real_kind(op, "param", param);
-  const Tensor g = dense_gradient(op, grad, param, kind);
-  on_device(kind, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, param.numel(),
-               step_of<T>(op, param, g, exp_avg, exp_avg_sq, lr, {beta1, beta2, eps}, weight_decay, step, sparse,
-                          copy ? &*copy : nullptr, kind));
-  });
-}
-
 void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vector<Tensor> exp_avgs,
                  std::vector<Tensor> exp_avg_sqs, std::vector<double> lrs, double beta1, double beta2, double eps,
                  std::vector<double> weight_decays, std::vector<int64_t> steps, std::vector<bool> sparse,
@@ -130,16 +117,12 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
-      "adamw_step_(Tensor(a!) param, Tensor grad, Tensor(b!) exp_avg, Tensor(c!) exp_avg_sq, float lr, float beta1, "
-      "float beta2, float eps, float weight_decay, int step, bool sparse, Tensor(d!)? copy=None) -> ()");
-  m.def(
       "adamw_steps_(Tensor(a!)[] params, Tensor[] grads, Tensor(b!)[] exp_avgs, Tensor(c!)[] exp_avg_sqs, float[] lrs, "
       "float beta1, float beta2, float eps, float[] weight_decays, int[] steps, bool[] sparse, Tensor(d!)[] copies, "
       "int[] copied, Tensor? allowed=None) -> ()");
 }
 
 SPLITNERF_IMPLEMENT(m) {
-  m.impl("adamw_step_", TORCH_BOX(&adamw_step));
   m.impl("adamw_steps_", TORCH_BOX(&adamw_steps));
 }
 

@@ -1,4 +1,4 @@
-// prefilter_light, sample_ggx_lobe, trace_visibility and occlusion_factors as torch operators.
+// prefilter_light, sample_ggx_lobe and occlusion_factors as torch operators.
 #include <cmath>
 #include <tuple>
 
@@ -49,16 +49,6 @@ Tensor prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor tota
                                     out<T>(grad_light));
   });
   return grad_light;
-}
-
-Tensor trace_visibility(int64_t scene, Tensor origins, Tensor directions, double t_far) {
-  const char* op = "trace_visibility";
-  const Tensor o = checked(op, "origins", origins, {kAny, 3}, ScalarType::Float);
-  const Tensor d = checked(op, "directions", directions, {o.size(0), 3}, ScalarType::Float);
-  Tensor visible = empty_like_type(o, {o.size(0)}, ScalarType::Bool);
-  get_scene(scene)->trace_visibility(in<float>(o), in<float>(d), o.size(0), static_cast<float>(t_far), nullptr,
-                                     out<uint8_t>(visible));
-  return visible;
 }
 
 std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Tensor normals, Tensor lobe_dirs,
@@ -113,7 +103,6 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar, "
       "Tensor light_dirs) -> Tensor");
   m.def("sample_ggx_lobe(Tensor axes, Tensor roughness, int n_samples, int seed) -> Tensor");
-  m.def("trace_visibility(int scene, Tensor origins, Tensor directions, float t_far) -> Tensor");
   m.def(
       "occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
       "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, bool along_ray, int seed) -> "
@@ -128,7 +117,6 @@ SPLITNERF_IMPLEMENT(m) {
 
 // Rays are traced on the CPU.
 STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
-  m.impl("trace_visibility", TORCH_BOX(&trace_visibility));
   m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors));
 }
 

@@ -1,4 +1,4 @@
-// log_chroma and light_prior as torch operators.
+// light_prior as a torch operator.
 #include <vector>
 
 #include "device.h"
@@ -6,31 +6,6 @@
 
 namespace splitnerf::glue {
 namespace {
-
-Tensor log_chroma(Tensor radiance) {
-  const char* op = "log_chroma";
-  const Kind type = real_kind(op, "radiance", radiance);
-  const Tensor x = checked(op, "radiance", radiance, {kAny, 3}, type);
-  Tensor loss = empty_like_type(x, {}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, x.size(0), LogChromaBody<T>{x.size(0), in<T>(x), out<T>(loss)});
-  });
-  return loss;
-}
-
-Tensor log_chroma_backward(Tensor radiance, Tensor grad_loss) {
-  const char* op = "log_chroma_backward";
-  const Kind type = real_kind(op, "radiance", radiance);
-  const Tensor x = checked(op, "radiance", radiance, {kAny, 3}, type),
-               g = checked(op, "grad_loss", grad_loss, {}, type);
-  Tensor grad_radiance = torch::stable::empty_like(x);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, x.size(0), LogChromaBackwardBody<T>{x.size(0), in<T>(x), in<T>(g), out<T>(grad_radiance)});
-  });
-  return grad_radiance;
-}
 
 template <class T>
 TexelLevels<T> texel_levels(const char* op, const Tensor& texels, const std::vector<int64_t>& sizes) {
@@ -73,15 +48,11 @@ Tensor light_prior_backward(Tensor texels, std::vector<int64_t> level_sizes, Ten
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("log_chroma(Tensor radiance) -> Tensor");
-  m.def("log_chroma_backward(Tensor radiance, Tensor grad_loss) -> Tensor");
   m.def("light_prior(Tensor texels, int[] level_sizes) -> Tensor");
   m.def("light_prior_backward(Tensor texels, int[] level_sizes, Tensor grad_loss) -> Tensor");
 }
 
 SPLITNERF_IMPLEMENT(m) {
-  m.impl("log_chroma", TORCH_BOX(&log_chroma));
-  m.impl("log_chroma_backward", TORCH_BOX(&log_chroma_backward));
   m.impl("light_prior", TORCH_BOX(&light_prior));
   m.impl("light_prior_backward", TORCH_BOX(&light_prior_backward));
 }

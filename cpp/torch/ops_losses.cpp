@@ -1,4 +1,4 @@
-// pixel_losses, gradient_losses, material_losses and quadratic_entropy as torch operators. The last one finds its gradient in
+// pixel_losses, gradient_losses and quadratic_entropy as torch operators. The last one finds its gradient in
 // the same pass; those of the others find the gradients anew, and read the sums that they divide by.
 #include <optional>
 #include <tuple>
@@ -112,46 +112,6 @@ Tensor gradient_losses_backward(Tensor gradients, Tensor weights, Tensor beside,
   return grad_gradients;
 }
 
-// Materials of points, checked and contiguous.
-struct Materials {
-  Kind type;
-  Tensor metallic, albedo, shares;
-  bool smooth_l1;
-
-  Materials(const char* op, const Tensor& albedo_in, const Tensor& metallic_in, const Tensor& shares_in, bool smooth_l1)
-      : type(real_kind(op, "metallic", metallic_in)), metallic(checked(op, "metallic", metallic_in, {kAny, 1}, type)),
-        albedo(checked(op, "albedo", albedo_in, {n(), 3}, type)), shares(checked(op, "shares", shares_in, {n()}, type)),
-        smooth_l1(smooth_l1) {}
-  int64_t n() const { return metallic.size(0); }
-  template <class T> MaterialLossArrays<T> view() const {
-    return {in<T>(albedo), in<T>(metallic), in<T>(shares), smooth_l1};
-  }
-};
-
-std::tuple<Tensor, Tensor> material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) {
-  const char* op = "material_losses";
-  const Materials x(op, albedo, metallic, shares, smooth_l1);
-  Tensor losses = empty_like_type(x.metallic, {3}, x.type), total = empty_like_type(x.metallic, {}, x.type);
-  on_device(x.type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, x.n(), MaterialLossesBody<T>{x.view<T>(), out<T>(losses), out<T>(total)});
-  });
-  return {losses, total};
-}
-
-Tensor material_losses_backward(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1, Tensor total,
-                                Tensor grad_losses) {
-  const char* op = "material_losses_backward";
-  const Materials x(op, albedo, metallic, shares, smooth_l1);
-  const Tensor sum = checked(op, "total", total, {}, x.type), g = checked(op, "grad_losses", grad_losses, {3}, x.type);
-  Tensor grad_metallic = empty_like_type(g, {x.n(), 1}, x.type);
-  on_device(x.type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, x.n(), MaterialLossesBackwardBody<T>{x.view<T>(), in<T>(sum), in<T>(g), out<T>(grad_metallic)});
-  });
-  return grad_metallic;
-}
-
 std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
   const char* op = "quadratic_entropy";
   const Kind type = real_kind(op, "x", x);
@@ -181,10 +141,6 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "gradient_losses_backward(Tensor gradients, Tensor weights, Tensor beside, Tensor total, Tensor grad_losses) -> "
       "Tensor");
-  m.def("material_losses(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1) -> (Tensor, Tensor)");
-  m.def(
-      "material_losses_backward(Tensor albedo, Tensor metallic, Tensor shares, bool smooth_l1, Tensor total, Tensor "
-      "grad_losses) -> Tensor");
   m.def("quadratic_entropy(Tensor x) -> (Tensor, Tensor)");
 }
 
@@ -193,8 +149,6 @@ SPLITNERF_IMPLEMENT(m) {
   m.impl("pixel_losses_backward", TORCH_BOX(&pixel_losses_backward));
   m.impl("gradient_losses", TORCH_BOX(&gradient_losses));
   m.impl("gradient_losses_backward", TORCH_BOX(&gradient_losses_backward));
-  m.impl("material_losses", TORCH_BOX(&material_losses));
-  m.impl("material_losses_backward", TORCH_BOX(&material_losses_backward));
   m.impl("quadratic_entropy", TORCH_BOX(&quadratic_entropy));
 }
 

@@ -1,4 +1,4 @@
-// specular_share, sample_bsdf, monte_carlo_light, summed_light and shade_sums as torch operators.
+// monte_carlo_light, summed_light and shade_sums as torch operators.
 #include <optional>
 #include <tuple>
 
@@ -7,45 +7,6 @@
 
 namespace splitnerf::glue {
 namespace {
-
-Tensor specular_share(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor lut) {
-  const char* op = "specular_share";
-  const Kind type = real_kind(op, "normals", normals);
-  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
-  const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
-  const Tensor a = checked(op, "albedo", albedo, {n.size(0), 3}, type);
-  const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor m = checked(op, "metallic", metallic, {n.size(0), 1}, type);
-  const Tensor table = checked_lut(op, lut, type);
-  Tensor share = empty_like_type(n, {n.size(0), 1}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(
-        op, n.size(0),
-        SpecularShareBody<T>{in<float>(table), in<T>(n), in<T>(v), in<T>(a), in<T>(rho), in<T>(m), out<T>(share)});
-  });
-  return share;
-}
-
-std::tuple<Tensor, Tensor> sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor specular_share,
-                                       int64_t n_samples, int64_t seed) {
-  const char* op = "sample_bsdf";
-  const Kind type = real_kind(op, "normals", normals);
-  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
-  const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
-  const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor share = checked(op, "specular_share", specular_share, {n.size(0), 1}, type);
-  require(n_samples > 0 && n_samples <= 1 << 20, op, "n_samples must be in [1, 2^20]");
-  Tensor directions = empty_like_type(n, {n.size(0), n_samples, 3}, type);
-  Tensor pdf = empty_like_type(n, {n.size(0), n_samples}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, n.size(0),
-               SampleBsdfBody<T>{in<T>(n), in<T>(v), in<T>(rho), in<T>(share), static_cast<int>(n_samples),
-                                 static_cast<uint32_t>(seed), out<T>(directions), out<T>(pdf)});
-  });
-  return {directions, pdf};
-}
 
 // What both directions of monte_carlo_light read.
 struct Inputs {
@@ -145,14 +106,10 @@ Tensor summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor d
 
 std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness,
                                                          Tensor directions, Tensor solid_angles, Tensor radiance,
-                                                         Tensor visible, Tensor sent, Tensor grad_sums,
-                                                         std::optional<Tensor> more_normals,
-                                                         std::optional<Tensor> more_roughness) {
+                                                         Tensor visible, Tensor sent, Tensor grad_sums) {
   const char* op = "summed_light_backward";
   const SharedInputs i(op, normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent);
   const Tensor g = checked(op, "grad_sums", grad_sums, {i.n_points(), kLightSums, 3}, i.type);
-  const auto more_n = checked_if(op, "more_normals", more_normals, {i.n_points(), 3}, i.type);
-  const auto more_rho = checked_if(op, "more_roughness", more_roughness, {i.n_points(), 1}, i.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
   Tensor grad_normals = like(i.normals), grad_roughness = like(i.roughness), grad_light = like(i.radiance);
   on_device(i.type, [&](auto zero, const auto& device) {
@@ -167,9 +124,7 @@ std::tuple<Tensor, Tensor, Tensor> summed_light_backward(Tensor normals, Tensor 
                                                                           in<T>(g),
                                                                           out<T>(grad_normals),
                                                                           out<T>(grad_roughness),
-                                                                          to_light,
-                                                                          in_or_null<T>(more_n),
-                                                                          in_or_null<T>(more_rho)});
+                                                                          to_light});
   });
   return {grad_normals, grad_roughness, grad_light};
 }
@@ -242,12 +197,6 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_ba
   "Tensor lut, bool compensate, "
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
-      "specular_share(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor lut) "
-      "-> Tensor");
-  m.def(
-      "sample_bsdf(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor specular_share, int n_samples, "
-      "int seed) -> (Tensor, Tensor)");
-  m.def(
       "monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
       "Tensor radiance) -> Tensor");
   m.def(
@@ -256,8 +205,8 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor "
       "solid_angles, "
-      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums, Tensor? more_normals=None, "
-      "Tensor? more_roughness=None) -> (Tensor, Tensor, Tensor)");
+      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> "
+      "(Tensor, Tensor, Tensor)");
   m.def(
       "monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
       "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
@@ -268,8 +217,6 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
 }
 
 SPLITNERF_IMPLEMENT(m) {
-  m.impl("specular_share", TORCH_BOX(&specular_share));
-  m.impl("sample_bsdf", TORCH_BOX(&sample_bsdf));
   m.impl("summed_light", TORCH_BOX(&summed_light));
   m.impl("summed_light_backward", TORCH_BOX(&summed_light_backward));
   m.impl("monte_carlo_light", TORCH_BOX(&monte_carlo_light));

@@ -89,51 +89,6 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> read_pixels(Tensor codes, Tensor inde
   return {target, exposure, background, whole};
 }
 
-std::tuple<Tensor, Tensor> probe_points(Tensor random, int64_t n_anywhere, double box, double deviation) {
-  const char* op = "probe_points";
-  const Kind type = real_kind(op, "random", random);
-  const Tensor u = checked(op, "random", random, {kAny}, type);
-  const int64_t n_shifts = (u.size(0) - 3 * n_anywhere) / 4;
-  require(n_anywhere >= 0 && n_shifts >= 0 && 3 * n_anywhere + 4 * n_shifts == u.size(0), op,
-          "random must hold three numbers for each point and four for each shift");
-  Tensor anywhere = empty_like_type(u, {n_anywhere, 3}, type), shifts = empty_like_type(u, {n_shifts, 3}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, n_anywhere + n_shifts,
-               ProbesBody<T>{n_anywhere, n_shifts, T(box), T(deviation), in<T>(u), out<T>(anywhere), out<T>(shifts)});
-  });
-  return {anywhere, shifts};
-}
-
-std::tuple<Tensor, Tensor, Tensor> place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts,
-                                                 Tensor t_ends, Tensor offsets, Tensor anywhere, Tensor chosen,
-                                                 Tensor shifts, int64_t room) {
-  const char* op = "place_samples";
-  const Kind type = real_kind(op, "rays_o", rays_o), whole = type.with(ScalarType::Long);
-  const Tensor o = checked(op, "rays_o", rays_o, {kAny, 3}, type),
-               d = checked(op, "rays_d", rays_d, {o.size(0), 3}, type);
-  const Tensor r = checked(op, "ray_indices", ray_indices, {kAny}, whole);
-  const int64_t n = r.size(0), n_room = std::max(n, room);
-  const Tensor begin = checked(op, "t_starts", t_starts, {n}, type), end = checked(op, "t_ends", t_ends, {n}, type);
-  const Tensor ends_of_rays = checked(op, "offsets", offsets, {o.size(0) + 1}, whole);
-  const Tensor points = checked(op, "anywhere", anywhere, {kAny, 3}, type),
-               which = checked(op, "chosen", chosen, {kAny}, type);
-  const Tensor apart = checked(op, "shifts", shifts, {which.size(0), 3}, type);
-  const int64_t n_anywhere = points.size(0), n_beside = n > 0 ? which.size(0) : 0;
-  if (type.on_cpu()) require(all_below<int64_t>(r, o.size(0)), op, "ray_indices must hold numbers of rays");
-  Tensor positions = empty_like_type(o, {n_room + n_anywhere + n_beside, 3}, type),
-         directions = empty_like_type(o, {n_room, 3}, type), beside = empty_like_type(o, {n_beside}, whole);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(
-        op, positions.size(0),
-        PlaceSamplesBody<T>{o.size(0), n, n_room, n_anywhere, in<T>(o), in<T>(d), in<int64_t>(r),
-                            in<int64_t>(ends_of_rays) + o.size(0), in<T>(begin), in<T>(end), in<T>(points),
-                            in<T>(which), in<T>(apart), out<T>(positions), out<T>(directions), out<int64_t>(beside)});
-  });
-  return {positions, directions, beside};
-}
-
 }  // namespace
 
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
@@ -145,17 +100,11 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "read_pixels(Tensor codes, Tensor index, Tensor view, Tensor exposures, Tensor backgrounds, Tensor edge_starts, "
       "Tensor edge_ends, Tensor edge_shift, Tensor edge_behind) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def("probe_points(Tensor random, int n_anywhere, float box, float deviation) -> (Tensor, Tensor)");
-  m.def(
-      "place_samples(Tensor rays_o, Tensor rays_d, Tensor ray_indices, Tensor t_starts, Tensor t_ends, Tensor "
-      "offsets, Tensor anywhere, Tensor chosen, Tensor shifts, int room) -> (Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
   m.impl("draw_rays", TORCH_BOX(&draw_rays));
   m.impl("read_pixels", TORCH_BOX(&read_pixels));
-  m.impl("probe_points", TORCH_BOX(&probe_points));
-  m.impl("place_samples", TORCH_BOX(&place_samples));
 }
 
 }  // namespace splitnerf::glue

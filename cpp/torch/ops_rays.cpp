@@ -1,4 +1,4 @@
-// march_rays, neus_weights, surface_weights, sharpness, spread_samples, interpolate and composite as torch operators.
+// march_rays, surface_weights, spread_samples, interpolate and composite as torch operators.
 #include <algorithm>
 #include <optional>
 #include <tuple>
@@ -64,45 +64,6 @@ PackedRays packed_rays(const Tensor& offsets, int64_t n_samples) {
   return {offsets.size(0) - 1, n_samples, in<int64_t>(offsets)};
 }
 
-std::tuple<Tensor, Tensor> neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets,
-                                        double min_transmittance) {
-  const char* op = "neus_weights";
-  const Kind type = real_kind(op, "f_prev", f_prev);
-  const Tensor p = checked(op, "f_prev", f_prev, {kAny}, type), q = checked(op, "f_next", f_next, {p.size(0)}, type);
-  const Tensor sharpness = checked(op, "s", s, {}, type), o = checked_offsets(op, offsets, p.size(0), type);
-  Tensor weights = empty_like_type(p, {p.size(0)}, type), opacity = empty_like_type(p, {o.size(0) - 1}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, o.size(0) - 1,
-               NeusWeightsBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness), T(min_transmittance),
-                                  out<T>(weights), out<T>(opacity)});
-  });
-  return {weights, opacity};
-}
-
-std::tuple<Tensor, Tensor, Tensor> neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets,
-                                                         double min_transmittance, Tensor weights, Tensor grad_weights,
-                                                         Tensor grad_opacity) {
-  const char* op = "neus_weights_backward";
-  const Kind type = real_kind(op, "f_prev", f_prev);
-  const Tensor p = checked(op, "f_prev", f_prev, {kAny}, type), q = checked(op, "f_next", f_next, {p.size(0)}, type);
-  const Tensor sharpness = checked(op, "s", s, {}, type), o = checked_offsets(op, offsets, p.size(0), type);
-  const int64_t n_rays = o.size(0) - 1;
-  const Tensor w = checked(op, "weights", weights, {p.size(0)}, type);
-  const Tensor gw = checked(op, "grad_weights", grad_weights, {p.size(0)}, type);
-  const Tensor ga = checked(op, "grad_opacity", grad_opacity, {n_rays}, type);
-  Tensor grad_p = empty_like_type(p, {p.size(0)}, type), grad_q = empty_like_type(p, {p.size(0)}, type);
-  Tensor grad_s = empty_like_type(p, {n_rays}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, n_rays,
-               NeusWeightsBackwardBody<T>{packed_rays(o, p.size(0)), in<T>(p), in<T>(q), in<T>(sharpness),
-                                          T(min_transmittance), in<T>(w), in<T>(gw), in<T>(ga), out<T>(grad_p),
-                                          out<T>(grad_q), out<T>(grad_s)});
-  });
-  return {grad_p, grad_q, grad_s};
-}
-
 // Weights and values of samples, checked and contiguous.
 struct Weighed {
   Kind type;
@@ -140,19 +101,17 @@ Tensor composite(Tensor weights, Tensor values, Tensor offsets, std::optional<Te
 // The gradient to the opacity is empty where there is none.
 std::tuple<Tensor, Tensor, Tensor> composite_backward(Tensor weights, Tensor values, Tensor offsets,
                                                       std::optional<Tensor> opacity, double least_opacity,
-                                                      Tensor grad_sums, std::optional<Tensor> more_opacity) {
+                                                      Tensor grad_sums) {
   const char* op = "composite_backward";
   const Weighed x(op, weights, values, offsets, opacity, least_opacity);
   const Tensor g = checked(op, "grad_sums", grad_sums, {x.n_rays(), x.values.size(1)}, x.type);
-  const auto more = checked_if(op, "more_opacity", more_opacity, {x.opacity ? x.n_rays() : 0}, x.type);
   Tensor grad_w = empty_like_type(g, {x.weights.size(0)}, x.type),
          grad_v = empty_like_type(g, {x.weights.size(0), x.values.size(1)}, x.type),
          grad_o = empty_like_type(g, {x.opacity ? x.n_rays() : 0}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, x.n_rays(),
-               CompositeBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_w), out<T>(grad_v), out<T>(grad_o),
-                                        in_or_null<T>(more)});
+               CompositeBackwardBody<T>{x.view<T>(), in<T>(g), out<T>(grad_w), out<T>(grad_v), out<T>(grad_o)});
   });
   return {grad_w, grad_v, grad_o};
 }
@@ -207,55 +166,22 @@ std::tuple<Tensor, Tensor, Tensor> surface_weights_backward(Tensor sdf, Tensor g
                                                             Tensor offsets, Tensor step, Tensor anneal,
                                                             double min_transmittance, int64_t n_samples, Tensor weights,
                                                             Tensor grad_normals, Tensor grad_weights,
-                                                            Tensor grad_opacity, std::optional<Tensor> more_sdf,
-                                                            std::optional<Tensor> more_gradient) {
+                                                            Tensor grad_opacity) {
   const char* op = "surface_weights_backward";
   const Surface x(op, sdf, gradient, rays_d, s, offsets, step, anneal, min_transmittance, n_samples);
   const Tensor w = checked(op, "weights", weights, {x.n}, x.type);
   const Tensor gn = checked(op, "grad_normals", grad_normals, {x.n, 3}, x.type);
   const Tensor gw = checked(op, "grad_weights", grad_weights, {x.n}, x.type);
   const Tensor ga = checked(op, "grad_opacity", grad_opacity, {x.n_rays()}, x.type);
-  const auto more_s = x.sdf.dim() == 2
-                          ? checked_if(op, "more_sdf", more_sdf, {x.n_rows(), x.stride()}, x.type)
-                          : checked_if(op, "more_sdf", more_sdf, {x.n_rows()}, x.type);
-  const auto more_g = checked_if(op, "more_gradient", more_gradient, {x.n_rows(), 3}, x.type);
   Tensor grad_sdf = torch::stable::empty_like(x.sdf), grad_gradient = empty_like_type(w, {x.n_rows(), 3}, x.type);
   Tensor grad_s = empty_like_type(w, {x.n_rays()}, x.type);
   on_device(x.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, x.n_rays(),
                SurfaceWeightsBackwardBody<T>{x.view<T>(), in<T>(w), in<T>(gn), in<T>(gw), in<T>(ga), out<T>(grad_sdf),
-                                             out<T>(grad_gradient), out<T>(grad_s), device.template scratch<T>(x.n),
-                                             in_or_null<T>(more_s), in_or_null<T>(more_g)});
+                                             out<T>(grad_gradient), out<T>(grad_s), device.template scratch<T>(x.n)});
   });
   return {grad_sdf, grad_gradient, grad_s};
-}
-
-Tensor sharpness(Tensor variance) {
-  const char* op = "sharpness";
-  const Kind type = real_kind(op, "variance", variance);
-  const Tensor v = torch::stable::contiguous(variance);
-  Tensor s = torch::stable::empty_like(v);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, v.numel(), SharpnessBody<T>{in<T>(v), out<T>(s)});
-  });
-  return s;
-}
-
-Tensor sharpness_backward(Tensor variance, Tensor grad_s) {
-  const char* op = "sharpness_backward";
-  const Kind type = real_kind(op, "variance", variance);
-  require(grad_s.scalar_type() == variance.scalar_type() && grad_s.numel() == variance.numel() &&
-              grad_s.device() == variance.device(),
-          op, "grad_s must be like variance");
-  const Tensor v = torch::stable::contiguous(variance), g = torch::stable::contiguous(grad_s);
-  Tensor grad_variance = torch::stable::empty_like(v);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, v.numel(), SharpnessBackwardBody<T>{in<T>(v), in<T>(g), out<T>(grad_variance)});
-  });
-  return grad_variance;
 }
 
 using Tensors8 = std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor>;
@@ -353,16 +279,10 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def(
       "march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
       "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def(
-      "neus_weights(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance) -> "
-      "(Tensor, Tensor)");
-  m.def(
-      "neus_weights_backward(Tensor f_prev, Tensor f_next, Tensor s, Tensor offsets, float min_transmittance, "
-      "Tensor weights, Tensor grad_weights, Tensor grad_opacity) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights(" SPLITNERF_SURFACE "=-1) -> (Tensor, Tensor, Tensor)");
   m.def("surface_weights_backward(" SPLITNERF_SURFACE
-        ", Tensor weights, Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity, "
-        "Tensor? more_sdf=None, Tensor? more_gradient=None) -> (Tensor, Tensor, Tensor)");
+        ", Tensor weights, Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity) -> "
+        "(Tensor, Tensor, Tensor)");
   m.def(
       "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray, int "
       "max_shaded=-1, int max_stretches=-1, Tensor? unit=None) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, "
@@ -376,15 +296,11 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "Tensor");
   m.def(
       "composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity, float least_opacity, Tensor "
-      "grad_sums, Tensor? more_opacity=None) -> (Tensor, Tensor, Tensor)");
-  m.def("sharpness(Tensor variance) -> Tensor");
-  m.def("sharpness_backward(Tensor variance, Tensor grad_s) -> Tensor");
+      "grad_sums) -> (Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
   m.impl("march_rays", TORCH_BOX(&march_rays));
-  m.impl("neus_weights", TORCH_BOX(&neus_weights));
-  m.impl("neus_weights_backward", TORCH_BOX(&neus_weights_backward));
   m.impl("surface_weights", TORCH_BOX(&surface_weights));
   m.impl("surface_weights_backward", TORCH_BOX(&surface_weights_backward));
   m.impl("spread_samples", TORCH_BOX(&spread_samples));
@@ -392,8 +308,6 @@ SPLITNERF_IMPLEMENT(m) {
   m.impl("interpolate_backward", TORCH_BOX(&interpolate_backward));
   m.impl("composite", TORCH_BOX(&composite));
   m.impl("composite_backward", TORCH_BOX(&composite_backward));
-  m.impl("sharpness", TORCH_BOX(&sharpness));
-  m.impl("sharpness_backward", TORCH_BOX(&sharpness_backward));
 }
 
 }  // namespace splitnerf::glue

@@ -1,4 +1,4 @@
-// query_direction, light_queries and split_sum_shade as torch operators.
+// light_queries and split_sum_shade as torch operators.
 #include <optional>
 #include <tuple>
 
@@ -7,42 +7,6 @@
 
 namespace splitnerf::glue {
 namespace {
-
-Tensor query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) {
-  const char* op = "query_direction";
-  const Kind type = real_kind(op, "normals", normals);
-  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
-  const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
-  const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor table = checked_lut(op, lut, type);
-  Tensor directions = empty_like_type(n, {n.size(0), 3}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, n.size(0),
-               QueryDirectionBody<T>{in<float>(table), mean, in<T>(n), in<T>(v), in<T>(rho), out<T>(directions)});
-  });
-  return directions;
-}
-
-std::tuple<Tensor, Tensor, Tensor> query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness,
-                                                            Tensor lut, bool mean, Tensor grad_directions) {
-  const char* op = "query_direction_backward";
-  const Kind type = real_kind(op, "normals", normals);
-  const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
-  const Tensor v = checked(op, "view_dirs", view_dirs, {n.size(0), 3}, type);
-  const Tensor rho = checked(op, "roughness", roughness, {n.size(0), 1}, type);
-  const Tensor table = checked_lut(op, lut, type);
-  const Tensor g = checked(op, "grad_directions", grad_directions, {n.size(0), 3}, type);
-  Tensor grad_n = empty_like_type(n, {n.size(0), 3}, type), grad_v = empty_like_type(n, {n.size(0), 3}, type);
-  Tensor grad_rho = empty_like_type(n, {n.size(0), 1}, type);
-  on_device(type, [&](auto zero, const auto& device) {
-    using T = decltype(zero);
-    device.run(op, n.size(0),
-               QueryDirectionBackwardBody<T>{in<float>(table), mean, in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
-                                             out<T>(grad_n), out<T>(grad_v), out<T>(grad_rho)});
-  });
-  return {grad_n, grad_v, grad_rho};
-}
 
 std::tuple<Tensor, Tensor> light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) {
   const char* op = "light_queries";
@@ -63,9 +27,7 @@ std::tuple<Tensor, Tensor> light_queries(Tensor normals, Tensor view_dirs, Tenso
 }
 
 std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut,
-                                                  bool mean, Tensor grad_directions, Tensor grad_asked_roughness,
-                                                  std::optional<Tensor> more_normals,
-                                                  std::optional<Tensor> more_roughness) {
+                                                  bool mean, Tensor grad_directions, Tensor grad_asked_roughness) {
   const char* op = "light_queries_backward";
   const Kind type = real_kind(op, "normals", normals);
   const Tensor n = checked(op, "normals", normals, {kAny, 3}, type);
@@ -75,15 +37,12 @@ std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_di
   const Tensor table = checked_lut(op, lut, type);
   const Tensor g = checked(op, "grad_directions", grad_directions, {2 * points, 3}, type);
   const Tensor g_rho = checked(op, "grad_asked_roughness", grad_asked_roughness, {2 * points, 1}, type);
-  const auto more_n = checked_if(op, "more_normals", more_normals, {points, 3}, type);
-  const auto more_rho = checked_if(op, "more_roughness", more_roughness, {points, 1}, type);
   Tensor grad_n = empty_like_type(n, {points, 3}, type), grad_rho = empty_like_type(n, {points, 1}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     device.run(op, points,
                LightQueriesBackwardBody<T>{in<float>(table), mean, points, in<T>(n), in<T>(v), in<T>(rho), in<T>(g),
-                                           in<T>(g_rho), out<T>(grad_n), out<T>(grad_rho), in_or_null<T>(more_n),
-                                           in_or_null<T>(more_rho)});
+                                           in<T>(g_rho), out<T>(grad_n), out<T>(grad_rho)});
   });
   return {grad_n, grad_rho};
 }
@@ -158,18 +117,12 @@ Tensor split_sum_shade(Tensor normals, Tensor view_dirs, Tensor albedo, Tensor r
 std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> split_sum_shade_backward(
     Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular,
     std::optional<Tensor> diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int64_t fresnel_mode,
-    bool compensate, std::optional<Tensor> indirect_s, std::optional<Tensor> indirect_d, Tensor grad_radiance,
-    std::optional<Tensor> more_normals, std::optional<Tensor> more_albedo, std::optional<Tensor> more_roughness,
-    std::optional<Tensor> more_metallic) {
+    bool compensate, std::optional<Tensor> indirect_s, std::optional<Tensor> indirect_d, Tensor grad_radiance) {
   const char* op = "split_sum_shade_backward";
   const ShadeInputs p(op, normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
                       lut, indirect_s, indirect_d);
   const ShadeOptions options = checked_options(op, fresnel_mode, compensate);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {p.n, 3}, p.type);
-  const auto more_n = checked_if(op, "more_normals", more_normals, {p.n, 3}, p.type),
-             more_a = checked_if(op, "more_albedo", more_albedo, {p.n, 3}, p.type),
-             more_rho = checked_if(op, "more_roughness", more_roughness, {p.n, 1}, p.type),
-             more_m = checked_if(op, "more_metallic", more_metallic, {p.n, 1}, p.type);
   const auto make = [&](int64_t columns) { return empty_like_type(p.normals, {p.n, columns}, p.type); };
   Tensor grad[9] = {make(3),
                     make(3),
@@ -186,10 +139,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
     const ShadeArrays<T> to{out<T>(grad[0]), out<T>(grad[1]), out<T>(grad[2]), out<T>(grad[3]),
                             out<T>(grad[4]), out<T>(grad[5]), to_diffuse,      out<T>(grad[7]),
                             out<T>(grad[8]), nullptr,         nullptr};
-    const MaterialGradients<T> more{in_or_null<T>(more_n), in_or_null<T>(more_a), in_or_null<T>(more_rho),
-                                    in_or_null<T>(more_m)};
-    device.run(op, p.n,
-               ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to, more});
+    device.run(op, p.n, ShadeBackwardBody<T>{in<float>(p.lut), options, p.n_channels, p.arrays<T>(), in<T>(g), to});
   });
   return {grad[0], grad[1], grad[2], grad[3], grad[4], grad[5], grad[6], grad[7], grad[8]};
 }
@@ -200,25 +150,17 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
   "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
   "Tensor? diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int fresnel_mode, bool compensate, "
 STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("query_direction(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> Tensor");
-  m.def(
-      "query_direction_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
-      "Tensor grad_directions) -> (Tensor, Tensor, Tensor)");
   m.def("light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> (Tensor, Tensor)");
   m.def(
       "light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
-      "Tensor grad_directions, Tensor grad_asked_roughness, Tensor? more_normals=None, Tensor? more_roughness=None) -> "
-      "(Tensor, Tensor)");
+      "Tensor grad_directions, Tensor grad_asked_roughness) -> (Tensor, Tensor)");
   m.def("split_sum_shade(" SPLITNERF_POINT "Tensor? indirect_s, Tensor? indirect_d) -> Tensor");
   m.def("split_sum_shade_backward(" SPLITNERF_POINT
-        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance, Tensor? more_normals=None, "
-        "Tensor? more_albedo=None, Tensor? more_roughness=None, Tensor? more_metallic=None) -> "
+        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance) -> "
         "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {
-  m.impl("query_direction", TORCH_BOX(&query_direction));
-  m.impl("query_direction_backward", TORCH_BOX(&query_direction_backward));
   m.impl("light_queries", TORCH_BOX(&light_queries));
   m.impl("light_queries_backward", TORCH_BOX(&light_queries_backward));
   m.impl("split_sum_shade", TORCH_BOX(&split_sum_shade));

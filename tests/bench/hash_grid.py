@@ -1,16 +1,14 @@
-"""The hash grid encoding: throughput forward and backward, with plain torch, Dr.Jit and the machine's gathers."""
+"""The hash grid encoding: throughput forward and backward, beside plain torch and Dr.Jit."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 import reference
 import torch
 from torch import Tensor
 
-from splitnerf import _core
 from splitnerf.ops import HashGridSpec, hash_encode
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
@@ -18,7 +16,6 @@ from splitnerf_tools.bench.peers import drjit_ready
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
 TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
-CORNERS = 8
 SOURCES = ("cpp/*hash*", "python/splitnerf/ops/hash_grid.py")
 
 
@@ -59,19 +56,10 @@ def run(quick: bool, rounds: int) -> Result:
     if not quick and drjit_ready():
         peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
         calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
-    entries = 1 << SPEC.log2_table_size
-    # The array is written once: until then all pages of np.zeros share one page of memory.
-    one_level, gathers = np.ones((entries, 2), np.float32), n * SPEC.n_levels * CORNERS
-    limit = ("gathers", "one level")
-    times = interleaved(calls | {limit: lambda: _core.random_gathers(one_level, gathers)}, rounds)
+    times = interleaved(calls, rounds)
 
     first, peer = ("splitnerf", "float32"), ("torch eager", "float32")
-    rate = gathers / times[limit].seconds
-    findings = [
-        f"forward and backward of {n} points: {times.ratio(peer, first)} as fast as torch eager",
-        f"the machine's gathers on one level: {rate / 1e6:.0f} M a second; forward and backward, counted as two gathers for each "
-        f"corner and level, reach {2 * times[limit].seconds / times[first].seconds:.0%} of it",
-    ]
+    findings = [f"forward and backward of {n} points: {times.ratio(peer, first)} as fast as torch eager"]
     findings += [f"{times.ratio(key, first)} as fast as Dr.Jit with {key[1]}" for key in calls if key[0] == "Dr.Jit"]
     title, cost = f"{n} points, 16 levels x 2, 2^19 entries", "ms forward and backward"
     chart = chart_of(title, cost, "largest error, of the largest value", times, errors, {first})

@@ -42,7 +42,7 @@ def neus() -> plt.Figure:
     for axis, s in zip(axes, (10.0, 60.0)):
         sharp = torch.tensor(s, dtype=torch.float64)
         pair = distance[:-1].contiguous(), distance[1:].contiguous()
-        weights, opacity = ops.neus_weights(*pair, sharp, offsets)
+        weights, opacity = weights_between(*pair, sharp, offsets)
         alpha = 1 - torch.exp(-depth(*pair, s))
         axis.plot(middles, alpha, color=BLUE, label="opacity of a sample")
         axis.fill_between(middles, weights, color=GOLD, alpha=0.7, label=f"weight (sum {opacity.item():.3f})")
@@ -52,10 +52,21 @@ def neus() -> plt.Figure:
     return figure
 
 
+def weights_between(
+    f_prev: torch.Tensor, f_next: torch.Tensor, s: torch.Tensor, offsets: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Weights and opacities from the distances at both ends, by samples of a length that no fall of the distance exceeds."""
+    step = float((f_next - f_prev).abs().max())
+    along = ((f_next - f_prev) / step).clamp(-1, 1)
+    gradient = torch.stack([torch.sqrt(1 - along**2), torch.zeros_like(along), along], 1)
+    rays_d = torch.tensor([[0.0, 0.0, 1.0]]).to(gradient).expand(len(offsets) - 1, 3)
+    return ops.surface_weights((f_prev + f_next) / 2, gradient, rays_d, s, offsets, step=step)[1:]
+
+
 def depth(f_prev: torch.Tensor, f_next: torch.Tensor, s: float) -> torch.Tensor:
     """The optical depth of each sample, from the opacity of a ray that consists of this sample alone."""
     alone = torch.arange(len(f_prev) + 1)
-    _, opacity = ops.neus_weights(f_prev, f_next, torch.tensor(s, dtype=f_prev.dtype), alone)
+    _, opacity = weights_between(f_prev, f_next, torch.tensor(s, dtype=f_prev.dtype), alone)
     return -torch.log1p(-opacity)
 
 
@@ -128,7 +139,7 @@ def lobe() -> plt.Figure:
         axis.set_thetalim(-np.pi / 2, np.pi / 2)
         axis.fill(angles, values / values.max(), color=GOLD, alpha=0.6)
         for query, colour, label in (("reflection", GREY, "mirror direction"), ("mean", BLUE, "asked: mean direction")):
-            d = ops.query_direction(normal, view, rough, query)[0]
+            d = ops.light_queries(normal, view, rough, query)[0][0]
             angle = float(torch.atan2(d[0], d[2]))
             axis.plot([angle, angle], [0, 1], color=colour, linewidth=2, label=label)
         axis.plot([-tilt, -tilt], [0, 1], color="black", linestyle=":", label="view")

@@ -18,7 +18,6 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -33,7 +32,6 @@ from splitnerf.ops import monte_carlo as monte_carlo_module
 from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
-from splitnerf.ops._library import HANDED_ON
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
@@ -81,26 +79,11 @@ def spread_samples(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_
 # ---- both runs ----
 
 
-class Replacement:
-    """A function in the place of an operator. Arguments that the operator would hand on are returned as they are: torch
-    adds up their gradients."""
-
-    def __init__(self, name: str, function: Callable):
-        self.function, self.handed_on = function, HANDED_ON.get(name, ())
-
-    def __call__(self, *arguments):
-        return self.function(*arguments)
-
-    def handing_on(self, *arguments):
-        found = self.function(*arguments)
-        return found if isinstance(found, tuple) else (found,), tuple(arguments[i] for i in self.handed_on)
-
-
 class Plain:
     """The operator library with these functions in the place of some operators."""
 
     def __init__(self, library, **replaced):
-        self.__dict__.update({name: Replacement(name, function) for name, function in replaced.items()})
+        self.__dict__.update(replaced)
         self.library = library
 
     def __getattr__(self, name: str):
@@ -115,7 +98,6 @@ def stacked(losses):
 REPLACED = {
     rays_module: dict(
         march_rays=reference.march_rays, surface_weights=reference.surface_weights, composite=reference.composite,
-        sharpness=reference.sharpness,
         spread_samples=spread_samples, interpolate=lambda values, first, second, share: values,
         interpolate_backward=lambda grad, first, second, share, shaded: grad,
     ),
@@ -123,9 +105,8 @@ REPLACED = {
         quadratic_entropy=lambda x: (reference.quadratic_entropy(x), None),
         pixel_losses=lambda *inputs: torch.stack(reference.pixel_losses(*inputs)),
         gradient_losses=stacked(reference.gradient_losses),
-        material_losses=stacked(reference.material_losses),
     ),
-    shading_module: dict(query_direction=reference.query_direction, split_sum_shade=reference.split_sum_shade),
+    shading_module: dict(light_queries=reference.light_queries, split_sum_shade=reference.split_sum_shade),
     monte_carlo_module: dict(
         monte_carlo_light=reference.monte_carlo_light, summed_light=reference.summed_light,
         shade_sums=reference.shade_sums,
@@ -138,19 +119,6 @@ REPLACED = {
 }  # fmt: skip
 
 
-class PlainAdamW(torch.optim.AdamW):
-    """torch's, which asks the host whether a step is allowed."""
-
-    counted = ()  # it counts no step that is not allowed
-
-    def step(self, allowed: Tensor) -> None:
-        if allowed:
-            super().step()
-
-    def take_back(self, counted: tuple) -> None:
-        """Nothing."""
-
-
 def use_plain_torch() -> None:
     """From here on every operator of a step is torch code."""
     for module, functions in REPLACED.items():
@@ -161,7 +129,7 @@ def use_plain_torch() -> None:
 
     def unfused(model, config):
         groups = make(model, config).param_groups
-        return PlainAdamW(
+        return torch.optim.AdamW(
             [{k: g[k] for k in ("params", "lr", "weight_decay", "rate")} for g in groups], betas=(0.9, 0.99), eps=1e-15
         )
 

@@ -15,10 +15,8 @@ from splitnerf.ops import (
     QUERIES,
     LightSums,
     monte_carlo_light,
-    query_direction,
-    sample_bsdf,
+    light_queries,
     shade_sums,
-    specular_share,
     split_sum_shade,
     summed_light,
 )
@@ -26,6 +24,7 @@ from splitnerf_tools.bench.charts import Chart, Point, Result
 from splitnerf_tools.bench.harness import rms
 from splitnerf_tools.bench.lights import MapLight, lights
 from splitnerf_tools.bench.prefilter import Truth
+from reference import drawn_directions
 
 ROUGHNESS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 COSINES = (0.1, 0.5, 0.9)  # n.v
@@ -133,13 +132,12 @@ def split_errors(
     roughness, metal, colour = rho * column, metallic * column, albedo * torch.ones(count, 3)
     diffuse = truth(normals, 1.0)
     seen = torch.ones(count, len(light.directions))
-    share = specular_share(normals, views, colour, roughness, metal)
     lamps = summed_light(
         normals, views, roughness, light.directions, light.solid_angles, light.lamps(light.directions), seen
     )
     groups = []
     for seed in range(GROUPS):
-        directions, pdf = sample_bsdf(normals, views, roughness, share, n, seed)
+        directions, pdf = drawn_directions(normals, views, roughness, 0.2 + 0.6 * metallic, n, seed)
         radiance = light.rest(directions.reshape(-1, 3)).view(count, n, 3)
         rest = monte_carlo_light(normals, views, roughness, directions, pdf, radiance)
         whole = LightSums(*(a + b for a, b in zip(rest, lamps)))._replace(diffuse=diffuse)
@@ -149,7 +147,7 @@ def split_errors(
     errors = {NOISE: float(torch.stack(groups).std(0).square().mean().sqrt() / GROUPS**0.5 / size)}
     ones = torch.ones(count, 3)
     for query in QUERIES:
-        specular = truth(query_direction(normals, views, roughness, query), rho)
+        specular = truth(light_queries(normals, views, roughness, query)[0][:count], rho)
         out = split_sum_shade(normals, views, colour, roughness, metal, specular, diffuse, ones, ones, compensate=True)
         errors[query] = float((out - true).square().mean().sqrt() / size)
     return errors

@@ -48,6 +48,12 @@ TEST(Neus, AlphaFollowsLongDouble) {
   RecordProperty("worst_relative_error", std::to_string(worst));
 }
 
+// A wall of depth 25 deep inside, where the distances at its ends have lost the digits of their difference.
+TEST(Neus, DepthFarBehindTheSurfaceIsTheDifference) {
+  EXPECT_FLOAT_EQ(neus_optical_depth(-2e6f, -2e6f, 25.f, 1.f), 25.f);
+  EXPECT_FLOAT_EQ(neus_optical_depth(-0.5f, -25.5f, 25.f, 1.f), 25.f - float(wide_softplus(-0.5)));
+}
+
 TEST(Neus, NothingWhereTheDistanceRises) {
   EXPECT_EQ(neus_optical_depth(0.1f, 0.1f, 0.f, 100.f), 0);
   EXPECT_EQ(neus_optical_depth(-0.1f, 0.2f, -0.3f, 100.f), 0);
@@ -56,11 +62,18 @@ TEST(Neus, NothingWhereTheDistanceRises) {
   EXPECT_TRUE(std::isnan(neus_optical_depth(kNan, 0.f, kNan, 1.f)));
 }
 
+// Samples given by the distances at their ends.
+template <class T> struct NeusEnds {
+  const T *f_prev, *f_next;
+
+  NeusInterval<T> operator()(int64_t i) const { return {f_prev[i], f_next[i], f_prev[i] - f_next[i]}; }
+};
+
 template <class T> struct Ray {
   std::vector<T> f_prev, f_next, weights;
   T opacity;
 
-  NeusEnds<T> ends() const { return {f_prev.data(), f_next.data(), nullptr}; }
+  NeusEnds<T> ends() const { return {f_prev.data(), f_next.data()}; }
 };
 
 // n samples of a ray along which the distance falls from f0 by `slope` in all.
@@ -123,7 +136,11 @@ struct Batch {
   std::vector<double> x;  // f_prev, f_next, s
   int64_t n = 0;
 
-  PackedRays rays() const { return {int64_t(offsets.size()) - 1, n, offsets.data()}; }
+  // Calls body(ray, its first sample, their number, their ends) for each ray.
+  template <class Body> void each(const Body& body) const {
+    for (size_t r = 0; r + 1 < offsets.size(); ++r)
+      body(r, offsets[r], offsets[r + 1] - offsets[r], NeusEnds<double>{&x[offsets[r]], &x[n + offsets[r]]});
+  }
 };
 
 // Rays that cross the surface, with a sample in each that rises; one ray is empty.
@@ -146,17 +163,22 @@ TEST(Neus, AdjointFollowsCentralDifferences) {
     for (const double min_transmittance : {0., 0.05}) {
       Batch b = crossing_rays(random, s);
       const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
-      std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), grad_s(4);
+      std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), depths(b.n);
       const auto f = [&] {
-        cpu::run(4, NeusWeightsBody<double>{b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance,
-                                            weights.data(), opacity.data()});
+        b.each([&](size_t r, int64_t first, int64_t length, const NeusEnds<double>& ends) {
+          opacity[r] =
+              neus_ray_weights(OneThread{}, ends, b.x.back(), length, min_transmittance, weights.data() + first);
+        });
         return inner(gw, weights) + inner(ga, opacity);
       };
       f();
-      cpu::run(4, NeusWeightsBackwardBody<double>{b.rays(), &b.x[0], &b.x[b.n], &b.x.back(), min_transmittance,
-                                                  weights.data(), gw.data(), ga.data(), &gradient[0], &gradient[b.n],
-                                                  grad_s.data()});
-      for (double g : grad_s) gradient.back() += g;
+      b.each([&](size_t r, int64_t first, int64_t length, const NeusEnds<double>& ends) {
+        gradient.back() += neus_ray_weights_backward(
+            OneThread{}, ends, b.x.back(), length, min_transmittance, weights.data() + first, gw.data() + first, ga[r],
+            depths.data() + first, [&](int64_t i, const OpticalDepthGrad<double>& g) {
+              gradient[first + i] = g.f_prev, gradient[b.n + first + i] = g.f_next;
+            });
+      });
       expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
     }
   }
@@ -170,7 +192,7 @@ TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
   std::vector<double> gw(n), weights(n), prev(n), next(n);
   std::vector<float> gw32(n), prev32(n), next32(n);
   for (int i = 0; i < n; ++i) gw32[i] = std::cos(float(i)), gw[i] = gw32[i];
-  const NeusEnds<double> ends{f_prev.data(), f_next.data(), nullptr};
+  const NeusEnds<double> ends{f_prev.data(), f_next.data()};
   neus_ray_weights(OneThread{}, ends, 4000., n, 0., weights.data());
   neus_ray_weights_backward(
       OneThread{}, ends, 4000., n, 0., weights.data(), gw.data(), 0., next.data(),

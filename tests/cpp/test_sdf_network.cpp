@@ -62,9 +62,10 @@ struct Case {
     const Vec3<double> unit{input[0] / 3 + 0.5, input[1] / 3 + 0.5, input[2] / 3 + 0.5};
     for (int l = 0; l < n_active; ++l) {
       const HashCell<double> cell = hash_cell(levels[l], unit);
+      const double x[] = {1 - cell.f.x, cell.f.x}, y[] = {1 - cell.f.y, cell.f.y}, z[] = {1 - cell.f.z, cell.f.z};
       for (int i = 0; i < 8; ++i)
         for (int f = 0; f < 2; ++f)
-          input[3 + 2 * l + f] += corner_weight_derivatives(cell, i).value * table[2 * cell.index[i] + f];
+          input[3 + 2 * l + f] += x[i & 1] * y[i >> 1 & 1] * z[i >> 2] * table[2 * cell.index[i] + f];
     }
     double sum = 0.25;
     for (int h = 0; h < width; ++h) {

@@ -62,9 +62,6 @@ FAULTS = (
           "first < total; first += Group::size", "first < total && first == 0; first += Group::size"),
     Fault("summed light's gradient: no barrier before the copies are added", "", CUDA + "summed_light.cu",
           "to_copy(Warp{}, p);\n  __syncthreads();", "to_copy(Warp{}, p);"),
-    Fault("materials' gradient: no barrier between a layer's gradient and the next", "", CUDA + "material_network.cu",
-          "rectified_backward(tile.at(x + c, p), sum) : sum; });\n      __syncthreads();",
-          "rectified_backward(tile.at(x + c, p), sum) : sum; });"),
     Fault("sparse product: only one lane takes part in the sum", "", BODIES + "bodies/light_pyramid.h",
           "    sum = sum3(group, sum);", "    if (group.lane() == 0) sum = sum3(group, sum);"),
 )  # fmt: skip

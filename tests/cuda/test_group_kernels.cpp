@@ -17,7 +17,7 @@ namespace {
 // Behind them are samples of no ray.
 struct Rays {
   std::vector<int64_t> offsets{0};
-  std::vector<double> f_prev, f_next, sdf, gradient, directions;
+  std::vector<double> sdf, gradient, directions;
   double s = 40, step = 0.02, anneal = 0.7;
 
   Rays() {
@@ -27,64 +27,23 @@ struct Rays {
       directions.insert(directions.end(), {d.x, d.y, d.z});
       for (int i = 0; i < length; ++i) {
         const double f = 0.1 - 0.15 * i / length + 0.01 * random.uniform(-1);
-        f_prev.push_back(f), f_next.push_back(f - 0.15 / length * random.uniform(-0.3, 2));
         sdf.push_back(f);
         const Vec3<double> g = random.direction() * random.uniform(0.3, 1.5) - d;
         gradient.insert(gradient.end(), {g.x, g.y, g.z});
       }
-      offsets.push_back(int64_t(f_prev.size()));
+      offsets.push_back(n());
     }
     for (int i = 0; i < 11; ++i) {
-      f_prev.push_back(0.1), f_next.push_back(-0.1), sdf.push_back(0);
+      sdf.push_back(0);
       gradient.insert(gradient.end(), {0., 0., 1.});
     }
   }
-  int64_t n() const { return int64_t(f_prev.size()); }
+  int64_t n() const { return int64_t(sdf.size()); }
   PackedRays packed() const { return {int64_t(offsets.size()) - 1, n(), offsets.data()}; }
   SurfaceSamples<double> surface() const {
     return {packed(), sdf.data(), gradient.data(), directions.data(), &s, &step, &anneal, 0.01};
   }
 };
-
-TEST(GroupKernels, NeusWeightsAndTheirGradients) {
-  const Rays r;
-  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
-  Random random(1);
-  const auto gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
-  for (const double least : {0., 0.3}) {
-    std::vector<double> w(n, 9), o(n_rays), prev(n, 9), next(n, 9), s(n_rays), w8(n, 7), o8(n_rays), prev8(n, 7),
-        next8(n, 7), s8(n_rays);
-    cpu::run(r.packed().n_rays,
-             NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(), o.data()});
-    cpu::run(r.packed().n_rays,
-             NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
-                                             gw.data(), go.data(), prev.data(), next.data(), s.data()});
-    on_gpu(r.packed().n_rays,
-           NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w8.data(), o8.data()});
-    on_gpu(r.packed().n_rays,
-           NeusWeightsBackwardBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, least, w.data(),
-                                           gw.data(), go.data(), prev8.data(), next8.data(), s8.data()});
-    expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
-    expect_near(prev8, prev, 1e-13), expect_near(next8, next, 1e-13), expect_near(s8, s, 1e-13);
-  }
-}
-
-// A NaN, which every sample behind it must see.
-TEST(GroupKernels, NeusWeightsPassANanOn) {
-  Rays r;
-  r.f_next[size_t(r.offsets[5]) + 5] = std::nan("");
-  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
-  std::vector<double> w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
-  cpu::run(r.packed().n_rays,
-           NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w.data(), o.data()});
-  on_gpu(r.packed().n_rays,
-         NeusWeightsBody<double>{r.packed(), r.f_prev.data(), r.f_next.data(), &r.s, 0., w32.data(), o32.data()});
-  for (size_t i = 0; i < n; ++i) {
-    EXPECT_EQ(std::isnan(w32[i]), std::isnan(w[i])) << i;
-    if (!std::isnan(w[i])) { EXPECT_NEAR(w32[i], w[i], 1e-14) << i; }
-  }
-  EXPECT_TRUE(std::isnan(o32[5]));
-}
 
 // The distance is the first of some columns, and behind the samples there are other points.
 TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
@@ -98,28 +57,38 @@ TEST(GroupKernels, SurfaceWeightsAndTheirGradients) {
     in.sdf = sdf.data(), in.stride = int64_t(stride), in.n_rows = int64_t(rows);
     Random random(2);
     const auto gn = random.uniforms(3 * n, -1), gw = random.uniforms(n, -1), go = random.uniforms(n_rays, -1);
-    const auto more_sdf = random.uniforms(stride * rows, -1), more_gradient = random.uniforms(3 * rows, -1);
-    const bool adds = stride > 1;  // with another reader of both
-    const double *const others[2] = {adds ? more_sdf.data() : nullptr, adds ? more_gradient.data() : nullptr};
     std::vector<double> normals(3 * n, 9), w(n, 9), o(n_rays), to_sdf(stride * rows, 9), to_gradient(3 * rows, 9),
         to_s(n_rays), depths(n);
     cpu::run(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals.data(), w.data(), o.data()});
     cpu::run(in.rays.n_rays,
              SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf.data(),
-                                                to_gradient.data(), to_s.data(), depths.data(), others[0], others[1]});
+                                                to_gradient.data(), to_s.data(), depths.data()});
     std::vector<double> normals8(3 * n, 7), w8(n, 7), o8(n_rays), to_sdf8(stride * rows, 7), to_gradient8(3 * rows, 7),
         to_s8(n_rays), depths8 = unwritten<double>(int64_t(n));
     on_gpu(in.rays.n_rays, SurfaceWeightsBody<double>{in, normals8.data(), w8.data(), o8.data()});
     on_gpu(in.rays.n_rays,
            SurfaceWeightsBackwardBody<double>{in, w.data(), gn.data(), gw.data(), go.data(), to_sdf8.data(),
-                                              to_gradient8.data(), to_s8.data(), depths8.data(), others[0], others[1]});
+                                              to_gradient8.data(), to_s8.data(), depths8.data()});
     expect_near(normals8, normals, 0), expect_near(w8, w, 1e-14), expect_near(o8, o, 1e-14);
-    for (const double last : {w8.back(), normals8.back()}) EXPECT_EQ(last, 0);
-    EXPECT_EQ(to_gradient8.back(), adds ? more_gradient.back() : 0);
-    EXPECT_EQ(to_sdf8.back(), adds ? more_sdf.back() : 0);
+    for (const double last : {w8.back(), normals8.back(), to_gradient8.back(), to_sdf8.back()}) EXPECT_EQ(last, 0);
     expect_near(to_sdf8, to_sdf, 1e-13), expect_near(to_gradient8, to_gradient, 1e-13);
     expect_near(to_s8, to_s, 1e-13);
   }
+}
+
+// A NaN, which every sample behind it must see.
+TEST(GroupKernels, SurfaceWeightsPassANanOn) {
+  Rays r;
+  r.sdf[size_t(r.offsets[5]) + 5] = std::nan("");
+  const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays);
+  std::vector<double> normals(3 * n), w(n, 9), o(n_rays), w32(n, 7), o32(n_rays);
+  cpu::run(int64_t(n_rays), SurfaceWeightsBody<double>{r.surface(), normals.data(), w.data(), o.data()});
+  on_gpu(int64_t(n_rays), SurfaceWeightsBody<double>{r.surface(), normals.data(), w32.data(), o32.data()});
+  for (size_t i = 0; i < n; ++i) {
+    EXPECT_EQ(std::isnan(w32[i]), std::isnan(w[i])) << i;
+    if (!std::isnan(w[i])) { EXPECT_NEAR(w32[i], w[i], 1e-14) << i; }
+  }
+  EXPECT_TRUE(std::isnan(o32[5]));
 }
 
 TEST(GroupKernels, CompositeAndItsGradients) {
@@ -127,15 +96,14 @@ TEST(GroupKernels, CompositeAndItsGradients) {
   const size_t n = size_t(r.n()), n_rays = size_t(r.packed().n_rays), channels = 5;
   Random random(4);
   const auto w = random.uniforms(n), v = random.uniforms(n * channels, -1), g = random.uniforms(n_rays * channels, -1),
-             opacity = random.uniforms(n_rays), more = random.uniforms(n_rays, -1);
+             opacity = random.uniforms(n_rays);
   for (const double* divisor : {static_cast<const double*>(nullptr), opacity.data()}) {
     const CompositeArrays<double> in{r.packed(), int64_t(channels), w.data(), v.data(), divisor, 0.3};
     const auto run = [&](const auto& launch) {
       std::vector<std::vector<double>> out{std::vector<double>(n_rays * channels, 9), std::vector<double>(n, 9),
                                            std::vector<double>(n * channels, 9), std::vector<double>(n_rays, 9)};
       launch(CompositeBody<double>{in, out[0].data()});
-      launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data(),
-                                           divisor ? more.data() : nullptr});
+      launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data()});
       return out;
     };
     const auto a = run([&](const auto&body) { cpu::run(in.rays.n_rays, body); }),
@@ -299,13 +267,9 @@ TEST(GroupKernels, MonteCarloSumsAndTheirGradients) {
   const int k = 21;
   Random random(9);
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
-  const auto share = random.uniforms(n, 0, 1);
-  std::vector<double> dirs(3 * n * k), pdf(n * k), dirs8(dirs.size()), pdf8(pdf.size());
-  cpu::run(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs.data(),
-                                     pdf.data()});
-  on_gpu(n, SampleBsdfBody<double>{normals.data(), views.data(), rho.data(), share.data(), k, 3u, dirs8.data(),
-                                   pdf8.data()});
-  expect_near(dirs8, dirs, 0), expect_near(pdf8, pdf, 0);
+  auto pdf = random.uniforms(n * k, 0.1, 2);
+  pdf[3] = 0;  // counts for nothing
+  std::vector<double> dirs(3 * n * k), dirs8(dirs.size());
   cpu::run(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs.data()});
   on_gpu(n, SampleLobeBody<double>{normals.data(), rho.data(), k, 5u, dirs8.data()});
   expect_near(dirs8, dirs, 0);
@@ -337,7 +301,7 @@ void check_summed_light(int64_t n, int k, bool with_sent) {
   const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n, 0.05, 1);
   const auto dirs = random.directions(k), angles = random.uniforms(k), radiance = random.uniforms(3 * k);
   const auto visible = random.uniforms(n * k), sent = random.uniforms(3 * n * k),
-             g = random.uniforms(3 * kLightSums * n, -1), more = random.uniforms(4 * n, -1);
+             g = random.uniforms(3 * kLightSums * n, -1);
   const SharedLight<double> light{
       k, dirs.data(), angles.data(), radiance.data(), visible.data(), with_sent ? sent.data() : nullptr};
   auto sums = unwritten<double>(3 * kLightSums * n), to_n = unwritten<double>(3 * n), to_rho = unwritten<double>(n),
@@ -347,8 +311,7 @@ void check_summed_light(int64_t n, int k, bool with_sent) {
   const auto backward = [&](std::vector<double>& n, std::vector<double>& rho_grad, std::vector<double>& light_grad) {
     return SharedLightBackwardBody<double>{k,          normals.data(),  views.data(),
                                            rho.data(), {light},         g.data(),
-                                           n.data(),   rho_grad.data(), {k, visible.data(), light_grad.data()},
-                                           more.data(), more.data() + 3 * (more.size() / 4)};
+                                           n.data(),   rho_grad.data(), {k, visible.data(), light_grad.data()}};
   };
   Gpu gpu;
   cpu::shared_light_backward(n, backward(to_n, to_rho, to_light));

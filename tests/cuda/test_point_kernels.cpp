@@ -3,10 +3,8 @@
 
 #include "check.h"
 #include "gpu.h"
-#include "splitnerf/bodies/corrections.h"
 #include "splitnerf/bodies/elementwise.h"
 #include "splitnerf/bodies/pixels.h"
-#include "splitnerf/bodies/rows.h"
 #include "splitnerf/light_tables.h"
 #include "splitnerf/ops_cpu.h"
 
@@ -37,13 +35,11 @@ TEST(PointKernels, SplitSumShading) {
                                        p + 14 * n, p + 17 * n, p + 17 * n + n * channels,
                                        nullptr,    nullptr};
           };
-          const auto more = random.uniforms(8 * n, -1);
-          const MaterialGradients<double> others{more.data(), more.data() + 3 * n, more.data() + 6 * n, more.data() + 7 * n};
           const ShadeOptions options{mode, compensate};
           cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance.data()});
-          cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data()), others});
+          cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad.data())});
           on_gpu(n, ShadeBody<double>{brdf_lut(), options, channels, in, radiance1.data()});
-          on_gpu(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad1.data()), others});
+          on_gpu(n, ShadeBackwardBody<double>{brdf_lut(), options, channels, in, g.data(), parts(grad1.data())});
           expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
         }
 }
@@ -74,75 +70,6 @@ TEST(PointKernels, SummedShading) {
         if (!mixed) grad.resize(23 * n), grad1.resize(23 * n);
         expect_near(radiance1, radiance, 1e-14), expect_near(grad1, grad, 1e-13);
       }
-    }
-}
-
-TEST(PointKernels, Corrections) {
-  for (const int64_t n : {0, 1, 300}) {
-    Random random(16);
-    const int64_t n_rays = 40;
-    const auto rho = random.uniforms(n, 0.2, 0.7), weights = random.uniforms(n), opacity = random.uniforms(n_rays),
-               added = random.uniforms(3 * n), g = random.uniforms(3 * n_rays);
-    std::vector<int64_t> candidates(n), shaded(n), rays(2 * n), segment(n);
-    for (int64_t i = 0; i < n; ++i) {
-      candidates[i] = random.below(int(n)), shaded[i] = 2 * i, segment[i] = i / 3;
-      rays[2 * i] = rays[2 * i + 1] = random.below(int(n_rays));
-    }
-    const WideLobes<double> lobes{candidates.data(), rho.data(), n, 0.3, 0.6};
-    const int64_t counted = n / 2;
-    auto at = unwritten<int64_t>(n), at1 = at, offsets = unwritten<int64_t>(n + 1);
-    auto share = unwritten<double>(n), share1 = share;
-    cpu::run(n, ShareWideLobesBody<double>{lobes, &counted, at.data(), share.data()});
-    on_gpu(n, ShareWideLobesBody<double>{lobes, &counted, at1.data(), share1.data()});
-    EXPECT_EQ(at1, at), expect_near(share1, share, 1e-15);
-
-    on_gpu(n, CountWideLobesBody<double>{lobes, offsets.data()});
-    offsets[0] = 0;
-    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
-    std::vector<int64_t> wide;
-    for (const int64_t i : candidates)
-      if (rho[i] > 0.3) wide.push_back(i);
-    ASSERT_EQ(offsets[n], int64_t(wide.size()));
-    auto packed = unwritten<int64_t>(wide.size());
-    auto shares = unwritten<double>(wide.size());
-    on_gpu(n, PackWideLobesBody<double>{lobes, offsets.data(), packed.data(), shares.data()});
-    EXPECT_EQ(packed, wide);
-    for (size_t k = 0; k < wide.size(); ++k) EXPECT_EQ(shares[k], smoothstep(0.3, 0.6, rho[wide[k]]));
-
-    const ShadedSegments<double> segments{n,           2 * n,          n_rays,         shaded.data(), rays.data(),
-                                          segment.data(), weights.data(), opacity.data(), 1e-4};
-    std::vector<double> mean(3 * n_rays, 0.5), mean1 = mean;
-    auto to_added = unwritten<double>(3 * n), to_added1 = to_added;
-    cpu::run(n, AddCorrectionsBody<double>{segments, candidates.data(), added.data(), mean.data()});
-    on_gpu(n, AddCorrectionsBody<double>{segments, candidates.data(), added.data(), mean1.data()});
-    cpu::run(n, AddCorrectionsBackwardBody<double>{segments, candidates.data(), g.data(), to_added.data()});
-    on_gpu(n, AddCorrectionsBackwardBody<double>{segments, candidates.data(), g.data(), to_added1.data()});
-    expect_near(mean1, mean, 1e-12), expect_near(to_added1, to_added, 1e-13);
-  }
-}
-
-TEST(PointKernels, QueryDirectionsAndShares) {
-  for (const int64_t n : {0, 1, 300})
-    for (const bool mean : {false, true}) {
-      Random random(25);
-      const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n),
-                 albedo = random.uniforms(3 * n), metallic = random.uniforms(n), g = random.uniforms(3 * n, -1);
-      auto out = unwritten<double>(3 * n), grad = unwritten<double>(7 * n), share = unwritten<double>(n), out1 = out,
-           grad1 = grad, share1 = share;
-      const auto forward = [&](double* to) {
-        return QueryDirectionBody<double>{brdf_lut(), mean, normals.data(), views.data(), rho.data(), to};
-      };
-      const auto backward = [&](double* to) {
-        return QueryDirectionBackwardBody<double>{brdf_lut(), mean, normals.data(), views.data(), rho.data(),
-                                                  g.data(),   to,   to + 3 * n,     to + 6 * n};
-      };
-      const auto shares = [&](double* to) {
-        return SpecularShareBody<double>{
-            brdf_lut(), normals.data(), views.data(), albedo.data(), rho.data(), metallic.data(), to};
-      };
-      cpu::run(n, forward(out.data())), cpu::run(n, backward(grad.data())), cpu::run(n, shares(share.data()));
-      on_gpu(n, forward(out1.data())), on_gpu(n, backward(grad1.data())), on_gpu(n, shares(share1.data()));
-      expect_near(out1, out, 1e-14), expect_near(grad1, grad, 1e-13), expect_near(share1, share, 1e-14);
     }
 }
 
@@ -258,101 +185,18 @@ TEST(PointKernels, ReadPixels) {
   }
 }
 
-TEST(PointKernels, Probes) {
-  for (const int64_t k : {0, 1, 300})
-    for (const int64_t m : {0, 1, 300}) {
-      Random random(135);
-      const auto u = random.uniforms(3 * k + 4 * m);
-      auto a = unwritten<double>(3 * (k + m)), b = a;
-      const auto body = [&](auto& out) {
-        return ProbesBody<double>{k, m, 1.3, 0.05, u.data(), out.data(), out.data() + 3 * k};
-      };
-      cpu::run(k + m, body(a)), on_gpu(k + m, body(b));
-      expect_near(b, a, 1e-15);
-    }
-}
-
-TEST(PointKernels, PlacedSamples) {
-  for (const int64_t n : {0, 1, 300})
-    for (const int64_t room : {n, 2 * n + 5}) {
-      Random random(95);
-      const int64_t rays = 20, k = 30, m = n > 0 ? 50 : 0, filled = n / 2;
-      const auto o = random.uniforms(3 * rays), d = random.directions(rays), begin = random.uniforms(n),
-                 end = random.uniforms(n, 1, 2), anywhere = random.uniforms(3 * k), chosen = random.uniforms(m),
-                 shifts = random.uniforms(3 * m);
-      std::vector<int64_t> indices(n);
-      for (int64_t& ray : indices) ray = random.below(int(rays));
-      const auto run = [&](const auto& launch) {
-        std::pair out{unwritten<double>(3 * (2 * room + k + m)), unwritten<int64_t>(m)};
-        double* points = out.first.data();
-        launch(PlaceSamplesBody<double>{rays, n, room, k, o.data(), d.data(), indices.data(), &filled, begin.data(),
-                                        end.data(), anywhere.data(), chosen.data(), shifts.data(), points,
-                                        points + 3 * (room + k + m), out.second.data()});
-        return out;
-      };
-      const auto a = run([&](const auto&body) { cpu::run(room + k + m, body); }),
-                 b = run([&](const auto&body) { on_gpu(room + k + m, body); });
-      expect_near(b.first, a.first, 1e-15);
-      EXPECT_EQ(b.second, a.second);
-    }
-}
-
-TEST(PointKernels, TakenAndAddedRows) {
-  for (const int64_t m : {0, 1, 300}) {
-    Random random(105);
-    const int64_t rows[] = {40, 50}, columns[] = {3, 1};
-    std::vector<int64_t> index(m);
-    for (int64_t& row : index) row = random.below(40);
-    const std::vector<double> all[] = {random.uniforms(120), random.uniforms(50)},
-                              given[] = {random.uniforms(3 * m), random.uniforms(m)};
-    const auto run = [&](const auto& launch) {
-      std::vector<std::vector<double>> out{unwritten<double>(3 * m), unwritten<double>(m), unwritten<double>(120),
-                                           unwritten<double>(50)};
-      RowArrays<double> taken, cleared, added;
-      for (int k = 0; k < 2; ++k) {
-        taken.add(m, rows[k], columns[k], all[k].data(), out[k].data());
-        cleared.add(rows[k], rows[k], columns[k], nullptr, out[2 + k].data());
-        added.add(m, rows[k], columns[k], given[k].data(), out[2 + k].data());
-      }
-      launch(taken.count(), TakeRowsBody<double>{index.data(), taken});
-      launch(cleared.count(), ClearArraysBody<double>{cleared});
-      launch(added.count(), AddRowsBody<double>{index.data(), added});
-      return out;
-    };
-    const auto a = run([](int64_t n, const auto& body) { cpu::run(n, body); });
-    const auto b = run([](int64_t n, const auto& body) { on_gpu(n, body); });
-    for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
-  }
-}
-
-TEST(PointKernels, RowsAreClearedUnlessTheyAreKept) {
-  for (const bool kept : {false, true})
-    for (const int64_t m : {0, 1, 700}) {
-      Random random(106);
-      const std::vector<double> before[] = {random.uniforms(m), random.uniforms(5)};
-      std::vector<double> values[] = {before[0], before[1]};
-      values[1][2] = NAN;
-      RowArrays<double> arrays;
-      for (auto& x : values) arrays.add(int64_t(x.size()), int64_t(x.size()), 1, nullptr, x.data());
-      on_gpu(arrays.count(), ClearUnlessBody<double>{&kept, {arrays}});
-      EXPECT_EQ(std::isnan(values[1][2]), kept);
-      values[1][2] = kept ? before[1][2] : values[1][2];
-      for (int k = 0; k < 2; ++k) expect_near(values[k], kept ? before[k] : std::vector<double>(before[k].size()), 0);
-    }
-}
-
 TEST(PointKernels, LightQueries) {
   for (const int64_t n : {0, 1, 300})
     for (const bool mean : {false, true}) {
       Random random(115);
       const auto normals = random.directions(n), views = random.directions(n), rho = random.uniforms(n),
-                 g = random.uniforms(6 * n, -1), g_rho = random.uniforms(2 * n, -1), more = random.uniforms(4 * n, -1);
+                 g = random.uniforms(6 * n, -1), g_rho = random.uniforms(2 * n, -1);
       const auto run = [&](const auto& launch) {
         auto out = unwritten<double>(12 * n);
         double* p = out.data();
         launch(LightQueriesBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), p, p + 6 * n});
         launch(LightQueriesBackwardBody<double>{brdf_lut(), mean, n, normals.data(), views.data(), rho.data(), g.data(),
-                                                g_rho.data(), p + 8 * n, p + 11 * n, more.data(), more.data() + 3 * n});
+                                                g_rho.data(), p + 8 * n, p + 11 * n});
         return out;
       };
       const auto a = run([&](const auto&body) { cpu::run(n, body); }),

@@ -14,19 +14,14 @@ from ray_inputs import (
     composite_case,
     draw_inputs,
     march_inputs,
-    neus_inputs,
     packed_samples,
-    place_inputs,
     read_inputs,
     surface_case,
 )
 from shading_inputs import (
-    correction_inputs,
     indirect_inputs,
-    material_inputs,
     mixed_sums_inputs,
     query_inputs,
-    sums_inputs,
 )
 from torch.utils._pytree import tree_map
 
@@ -34,10 +29,8 @@ from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import (
     CELL_OCCUPIED,
     HashGridSpec,
-    brdf_lut,
     fibonacci_directions,
     light_averages,
-    sample_bsdf,
     zonal_factors,
 )
 
@@ -52,14 +45,6 @@ def hash_inputs(device, dtype, n: int = 9) -> tuple:
     positions = torch.rand(n, 3, generator=generator(), dtype=torch.float64) * 1.1 - 0.05
     table = torch.rand(HASH_SPEC.n_entries, 2, generator=generator(1), dtype=torch.float64) * 2 - 1
     return positions.to(device, dtype), table.to(device, dtype), *HASH_SPEC.arguments(2)
-
-
-def hash_gradients(inputs: tuple) -> tuple:
-    """Gradients to the features and to the Jacobian."""
-    n = inputs[0].shape[0]
-    features = torch.randn(n, HASH_SPEC.n_outputs, generator=generator(2), dtype=torch.float64)
-    jacobian = torch.randn(n, 3, HASH_SPEC.n_outputs, generator=generator(3), dtype=torch.float64)
-    return tuple(x.to(inputs[0]) for x in (features, jacobian))
 
 
 # ---- the light filtered over given directions ----
@@ -133,10 +118,6 @@ def field_gradients(dtype=torch.float64) -> tuple:
     return g.to(dtype), rand(20, seed=2, dtype=dtype), beside
 
 
-def metal_inputs(dtype) -> tuple:
-    return rand(600, 3, dtype=dtype), rand(600, 1, seed=1, dtype=dtype), rand(600, seed=2, dtype=dtype), False
-
-
 # ---- light over drawn and over shared directions ----
 
 
@@ -145,8 +126,8 @@ def drawn_inputs(n: int = 5, k: int = 6, dtype=torch.float64, seed: int = 0) -> 
     normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
     view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
     roughness = 0.2 + 0.7 * torch.rand(n, 1, generator=g, dtype=dtype)
-    share = 0.2 + 0.6 * torch.rand(n, 1, generator=g, dtype=dtype)
-    directions, pdf = sample_bsdf(normals, view_dirs, roughness, share, k, seed)
+    directions = unit(normals[:, None] + torch.randn(n, k, 3, generator=g, dtype=dtype))  # some from below
+    pdf = 0.1 + torch.rand(n, k, generator=g, dtype=dtype)
     return normals, view_dirs, roughness, directions, pdf, torch.rand(n, k, 3, generator=g, dtype=dtype)
 
 
@@ -242,11 +223,6 @@ def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
 # ---- every operator ----
 
 
-def row_numbers() -> torch.Tensor:
-    """300 of 40 rows, so that some are taken several times and by two blocks of a GPU."""
-    return torch.randint(40, (300,), generator=generator(7))
-
-
 def spread_inputs(dtype) -> tuple:
     weights, samples, phase = packed_samples(dtype)
     return weights, samples.middles, samples.offsets, phase, 0.5, 2
@@ -287,21 +263,6 @@ def with_gradients(op: str, inputs: tuple, *between: int) -> tuple:
     return *inputs, *(outputs[i] for i in between), *ones_like_outputs(op, inputs)
 
 
-def with_more(op: str, inputs: tuple, *shared: int, kept: tuple[int, ...] = ()) -> tuple:
-    """The same with the gradients that other readers of some inputs found."""
-    more = (torch.randn(inputs[i].shape, generator=generator(20 + i), dtype=torch.float64).to(inputs[i].dtype) for i in shared)
-    return *with_gradients(op, inputs, *kept), *more
-
-
-def step_inputs(dtype) -> tuple:
-    """Arguments of ``step_numbers``: a gradient of several items, short ones, an empty one, and one number that is too large."""
-    shapes = (5000, 3), (7,), (0, 2), (33, 1), (1,)
-    gradients = [rand(*shape, seed=i, dtype=dtype) for i, shape in enumerate(shapes)]
-    terms, counts = [rand(2, seed=9, dtype=dtype), rand(1, seed=8, dtype=dtype)[0]], [torch.tensor(70), torch.tensor([40, 9, 12])]
-    limits = torch.full((10,), 1e6, dtype=dtype).index_fill(0, torch.tensor([5]), 40.0)
-    return gradients, terms, counts, torch.randint(9, (300,), generator=generator(7)), rand(1, seed=6, dtype=dtype)[0], limits
-
-
 def hash_backward(op: str, dtype, first: int) -> tuple:
     """positions (and from `first` = 2 the table), the gradients, the grid's numbers."""
     inputs = hash_inputs("cpu", dtype, 200)
@@ -312,35 +273,21 @@ def hash_backward(op: str, dtype, first: int) -> tuple:
 CASES = {
     "hash_encode": lambda t: hash_inputs("cpu", t, 200),
     "hash_encode_backward": lambda t: hash_backward("hash_encode", t, 1),
-    "hash_encode_jacobian": lambda t: hash_inputs("cpu", t, 200),
-    "hash_encode_jacobian_backward": lambda t: hash_backward("hash_encode_jacobian", t, 1),
-    "hash_encode_jacobian_backward_positions": lambda t: hash_backward("hash_encode_jacobian", t, 2),
-    "query_direction": lambda t: query_inputs("cpu", t, True, 300),
-    "query_direction_backward": lambda t: with_gradients("query_direction", query_inputs("cpu", t, True, 300)),
+    "hash_encode_backward_positions": lambda t: hash_backward("hash_encode", t, 2),
     "light_queries": lambda t: query_inputs("cpu", t, True, 300),
-    "light_queries_backward": lambda t: with_more("light_queries", query_inputs("cpu", t, True, 300), 0, 2),
-    "take_rows": lambda t: ([rand(40, 3, dtype=t), rand(50, 1, seed=1, dtype=t)], row_numbers()),
-    "put_rows": lambda t: ([rand(300, 3, dtype=t), rand(300, 1, seed=1, dtype=t)], row_numbers(), [40, 50]),
-    "step_numbers": step_inputs,
+    "light_queries_backward": lambda t: with_gradients("light_queries", query_inputs("cpu", t, True, 300)),
     "split_sum_shade": indirect_inputs,
-    "split_sum_shade_backward": lambda t: with_more("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True), 0, 2, 3, 4),
-    "material_network": lambda t: material_inputs(300, t),
-    "material_network_backward": lambda t: with_gradients("material_network", material_inputs(300, t)),
-    "wide_lobes": lambda t: (row_numbers() % 40, rand(40, 1, dtype=t), 0.3, 0.6, torch.tensor(100)),
-    "add_corrections": correction_inputs,
-    "add_corrections_backward": lambda t: (*correction_inputs(t)[2:], rand(4, 3, seed=5, dtype=t)),
+    "split_sum_shade_backward": lambda t: with_gradients("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True)),
     "prefilter_light": lambda t: prefilter_inputs("cpu", t, 100, 900),
     "prefilter_light_backward": lambda t: prefilter_backward_inputs("cpu", t),
     "sample_ggx_lobe": lambda t: (*prefilter_inputs("cpu", t, 50)[:2], 70, 3),
     "sparse_product": sparse_inputs,
     "light_lookup": lambda t: lookup_inputs(t, 300),
     "light_lookup_backward": lambda t: with_gradients("light_lookup", lookup_inputs(t, 300)),
-    "specular_share": lambda t: (*sums_inputs(300, t)[:5], brdf_lut()),
-    "sample_bsdf": lambda t: (*drawn_inputs(40, dtype=t)[:3], rand(40, 1, seed=5, dtype=t), 70, 3),
     "monte_carlo_light": lambda t: drawn_inputs(40, 70, t),
     "monte_carlo_light_backward": lambda t: with_gradients("monte_carlo_light", drawn_inputs(40, 70, t)),
     "summed_light": lambda t: shared_inputs(40, dtype=t),
-    "summed_light_backward": lambda t: with_more("summed_light", shared_inputs(40, dtype=t), 0, 2),
+    "summed_light_backward": lambda t: with_gradients("summed_light", shared_inputs(40, dtype=t)),
     "shade_sums": lambda t: mixed_sums_inputs(300, t),
     "shade_sums_backward": lambda t: with_gradients("shade_sums", mixed_sums_inputs(300, t)),
     "linear_to_srgb": lambda t: (rand(40, 7, dtype=t),),
@@ -350,26 +297,16 @@ CASES = {
     "pixel_losses_backward": lambda t: with_gradients("pixel_losses", (*pixel_inputs(600, t), True)),
     "gradient_losses": field_gradients,
     "gradient_losses_backward": lambda t: with_gradients("gradient_losses", field_gradients(t), 1)[:-1],
-    "material_losses": metal_inputs,
-    "material_losses_backward": lambda t: with_gradients("material_losses", metal_inputs(t), 1)[:-1],
     "quadratic_entropy": lambda t: (rand(70, 11, dtype=t),),
-    "log_chroma": lambda t: (rand(600, 3, dtype=t),),
-    "log_chroma_backward": lambda t: with_gradients("log_chroma", CASES["log_chroma"](t)),
     "light_prior": lambda t: (3 * rand(336, 3, dtype=t) - 1, [16, 64, 256]),
     "light_prior_backward": lambda t: with_gradients("light_prior", CASES["light_prior"](t)),
     "draw_rays": draw_inputs,
     "read_pixels": read_inputs,
-    "probe_points": lambda t: (rand(3 * 200 + 4 * 150, dtype=t), 200, 1.3, 0.05),
-    "place_samples": place_inputs,
     "march_rays": lambda t: march_inputs("cpu", t, 300),
-    "neus_weights": lambda t: neus_inputs("cpu", t, 0.01),
-    "neus_weights_backward": lambda t: with_gradients("neus_weights", neus_inputs("cpu", t, 0.01), 0),
     "surface_weights": surface_case,
-    "surface_weights_backward": lambda t: with_more("surface_weights", surface_case(t), 0, 1, kept=(1,)),
-    "sharpness": lambda t: (torch.linspace(-0.2, 1.1, 41, dtype=t),),  # no number is a bound
-    "sharpness_backward": lambda t: with_gradients("sharpness", CASES["sharpness"](t)),
+    "surface_weights_backward": lambda t: with_gradients("surface_weights", surface_case(t), 1),
     "composite": composite_case,
-    "composite_backward": lambda t: with_more("composite", composite_case(t), 3),
+    "composite_backward": lambda t: with_gradients("composite", composite_case(t)),
     "spread_samples": spread_inputs,
     "sample_rays": sample_rays_inputs,
     "sdf_field": lambda t: sdf_field_inputs(150, t),

@@ -10,24 +10,6 @@ from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
 
 
-def neus_inputs(device, dtype, min_transmittance: float = 0.0) -> tuple:
-    """Arguments of ``neus_weights``: rays that cross the surface, with some samples along which f rises."""
-    n = OFFSETS[-1]
-    draw = generator()
-    f_prev = torch.linspace(0.5, -0.3, n, dtype=torch.float64) + 0.1 * torch.rand(
-        n, generator=draw, dtype=torch.float64
-    )
-    f_next = f_prev - 0.1 + 0.15 * torch.rand(n, generator=draw, dtype=torch.float64)
-    offsets = torch.tensor(OFFSETS, device=device)
-    return (
-        f_prev.to(device, dtype),
-        f_next.to(device, dtype),
-        torch.tensor(8.0, device=device, dtype=dtype),
-        offsets,
-        min_transmittance,
-    )
-
-
 def composite_inputs(device, dtype) -> tuple:
     weights = torch.rand(OFFSETS[-1], generator=generator(1), dtype=torch.float64)
     values = torch.randn(OFFSETS[-1], 4, generator=generator(2), dtype=torch.float64)
@@ -63,15 +45,6 @@ def read_inputs(dtype, n: int = 300) -> tuple:
     index, behind = torch.randint(120, (n,), generator=draw), torch.randint(256, (46, 3), generator=draw).to(torch.uint8)
     edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54]), behind
     return codes, index, index // 40, rand(3, 3, seed=9, dtype=dtype), rand(n, 3, seed=10, dtype=dtype), *edges
-
-
-def place_inputs(dtype) -> tuple:
-    """Arguments of ``place_samples``: samples of 20 rays in rows for a few more, room for others, and points beside some."""
-    rays_o, rays_d = (torch.randn(20, 3, generator=generator(i), dtype=torch.float64) for i in range(2))
-    ray_indices, starts = torch.randint(20, (200,), generator=generator(2)), rand(200, seed=3)
-    numbers = rays_o, unit(rays_d), starts, starts + 0.1, rand(30, 3, seed=4), rand(50, seed=5), rand(50, 3, seed=6)
-    rays_o, rays_d, *rest = (x.to(dtype) for x in numbers)
-    return rays_o, rays_d, ray_indices, *rest[:2], torch.arange(0, 200, 9)[:21], *rest[2:], 260
 
 
 def composite_case(dtype) -> tuple:

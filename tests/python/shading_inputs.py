@@ -1,4 +1,4 @@
-"""Inputs of the operators that shade: split sum, sums over light, materials and corrections of rays."""
+"""Inputs of the operators that shade: split sum, sums over light and corrections of rays."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def mixed_sums_inputs(n: int, dtype, compensate: bool = True) -> tuple:
 
 
 def query_inputs(device, dtype, mean: bool = True, n: int = 7) -> tuple:
-    """Arguments of ``query_direction``; some normals face away from the viewer."""
+    """Arguments of ``light_queries``; some normals face away from the viewer."""
     normals, views = (unit(torch.randn(n, 3, generator=generator(i), dtype=torch.float64)) for i in (0, 1))
     roughness = torch.rand(n, 1, generator=generator(2), dtype=torch.float64) * 0.8 + 0.1
     return *(x.to(device, dtype) for x in (normals, views, roughness)), brdf_lut(device), mean
@@ -54,18 +54,6 @@ def indirect_inputs(dtype, mode: int = 0, channels: int = 3, n: int = 300, stack
     return *points, *light, *rest, *indirect
 
 
-# ---- the materials' network ----
-
-
-def material_inputs(n: int = 300, dtype=torch.float64, sizes: tuple[int, ...] = (13, 8, 6), parts: tuple[int, ...] = (5, 3, 5)):
-    """Arguments of ``material_network``."""
-    g = generator(3)
-    shapes = list(zip([*sizes[1:], 5], sizes))
-    weights = [torch.randn(shape, generator=g, dtype=torch.float64).to(dtype) for shape in shapes]
-    biases = [torch.randn(shape[0], generator=g, dtype=torch.float64).to(dtype) for shape in shapes]
-    return [torch.randn(n, k, generator=g, dtype=torch.float64).to(dtype) for k in parts], weights, biases, 0.1
-
-
 # ---- corrections of rays ----
 
 
@@ -76,9 +64,3 @@ def shaded_rays(dtype=torch.float64) -> tuple:
     lengths = torch.tensor([1, 2, 5, 3, 4]).repeat(10)
     segment = torch.repeat_interleave(torch.arange(50), lengths)
     return shaded, ray_indices, segment, rand(150, seed=1, dtype=dtype), rand(4, seed=2, dtype=dtype)
-
-
-def correction_inputs(dtype=torch.float64) -> tuple:
-    """Arguments of ``add_corrections``; two samples of one ray are corrected."""
-    at = torch.tensor([7, 120, 0, 9, 149])
-    return rand(4, 3, dtype=dtype), rand(5, 3, seed=4, dtype=dtype), at, *shaded_rays(dtype), 1e-4

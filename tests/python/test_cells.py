@@ -16,7 +16,7 @@ from test_visibility import Field
 from splitnerf.fields import EvaluatedLight, LightPyramid, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light_pyramid import octahedral_texels
 from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import cached_visibility, trace_visibility
+from splitnerf.ops import cached_visibility
 from splitnerf.render.renderer import find_samples, render_rays
 
 
@@ -115,7 +115,7 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
         light = lamp(sun)
         true = octahedral_texels(128, torch.device("cpu"))[0]
         true = true[(true @ sun).argmax()]
-        shadow = ~trace_visibility(scene, x + OFFSET * up, true.expand(6400, 3))
+        shadow = ~scene.is_open(x + OFFSET * up, true.expand(6400, 3))
         for aims in (True, False):
             bits = VisibilityBits(256, OFFSET, 1, indirect=False)
             lit = EvaluatedLight(light.evaluate())

@@ -266,7 +266,7 @@ class TestChoice:
             ({"built": ""}, "this build has no GPU kernels"), ({"there": False}, "torch finds no GPU"),
             ({"capability": (8, 6)}, "this build has no kernels for the Big GPU"),
             ({"failed": ["composite"]}, "the Big GPU fails the test of composite (splitnerf doctor)"),
-            ({"failed": ["composite", "adamw_step_", "sdf_field"]},
+            ({"failed": ["composite", "adamw_steps_", "sdf_field"]},
              "the Big GPU fails the test of composite and 2 more (splitnerf doctor)"),
         ],
     )  # fmt: skip

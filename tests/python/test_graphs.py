@@ -158,7 +158,7 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     assert not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3  # none goes to and fro
     # A kind of steps is called, then recorded, and recorded anew where the graph has too little room.
     assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
-    assert len(replayed) > 70 and max(replayed) <= 50 and statistics.median(replayed) <= 30
+    assert len(replayed) > 70 and max(replayed) <= 100 and statistics.median(replayed) <= 80
 
     monkeypatch.setattr(gpu_step, "record", called)
     other, _ = schedule_of_a_gpu(data, tmp_path / "called", monkeypatch, recording)

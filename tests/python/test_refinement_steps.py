@@ -9,7 +9,7 @@ from painted_ball import sky
 
 from splitnerf import _core
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops import monte_carlo_light, sample_bsdf
+from splitnerf.ops import monte_carlo_light
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
@@ -17,6 +17,7 @@ from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
+from reference import drawn_directions
 
 
 def chain(**weights: float) -> Prior:
@@ -283,8 +284,8 @@ def test_centred_derivatives_say_the_same_with_less_noise():
     n, k = 400, 12
     normals = torch.tensor([0.0, 0.0, 1.0]).expand(n, 3).contiguous().requires_grad_(True)
     view = torch.nn.functional.normalize(torch.tensor([[0.5, 0.2, 1.0]]), dim=1).expand(n, 3).contiguous()
-    roughness, share = torch.full((n, 1), 0.4).requires_grad_(True), torch.full((n, 1), 0.8)
-    directions, pdf = sample_bsdf(normals.detach(), view, roughness.detach(), share, k, 3)
+    roughness = torch.full((n, 1), 0.4).requires_grad_(True)
+    directions, pdf = drawn_directions(normals.detach(), view, roughness.detach(), 0.8, k, 3)
     light = (1.0 + 0.3 * directions[..., :1]).expand(-1, -1, 3)
     drawn = (normals, view, roughness, directions, pdf)
     plain, of_one = monte_carlo_light(*drawn, light), monte_carlo_light(*drawn, torch.ones_like(light))

@@ -14,7 +14,7 @@ from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import EvaluatedLight, Light, VisibilityBits
 from splitnerf.fields.light import panorama_directions
-from splitnerf.ops import monte_carlo_light, prefilter_light, query_direction, shade_sums, split_sum_shade
+from splitnerf.ops import monte_carlo_light, prefilter_light, light_queries, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
 
 
@@ -72,7 +72,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     rough, metal, albedo = torch.full((200, 1), 0.6), torch.zeros(200, 1), torch.full((200, 3), 0.05)
     exact = brute_force(model.light, n, views, albedo, rough, metal).detach()
     light = prefiltered(
-        model.light, torch.cat([query_direction(n, views, rough), n]), torch.cat([rough, torch.ones_like(rough)])
+        model.light, torch.cat([light_queries(n, views, rough)[0][:200], n]), torch.cat([rough, torch.ones_like(rough)])
     )
     one = torch.ones(200, 3)
     split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)

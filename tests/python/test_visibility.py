@@ -23,9 +23,8 @@ from splitnerf.ops import (
     cached_occlusion,
     cached_visibility,
     occlusion_factors,
-    query_direction,
+    light_queries,
     split_sum_shade,
-    trace_visibility,
     visibility_bits,
 )
 from splitnerf.render.model import SceneModel
@@ -52,7 +51,7 @@ def test_bits_and_hits_are_those_of_single_rays():
         ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(len(x), 2, 96).unbind(1)
     )
     origins = (x + OFFSET * n)[:, None].expand(-1, 96, 3)
-    expected = trace_visibility(scene, origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
+    expected = scene.is_open(origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
     above = n @ w.T > 0
     assert torch.equal(open_, expected & above) and torch.equal(blocked, ~expected & above)
     assert torch.equal(hits >= 0, blocked) and 0.02 < blocked[above].float().mean() < 0.9
@@ -190,7 +189,7 @@ def test_spheres_on_a_plane_against_4096_rays():
         for rho, bound in ((0.1, 0.13), (0.2, 0.084), (0.3, 0.051), (0.5, 0.025)):
             view = unit(n + 0.9 * unit(torch.randn(len(n), 3, generator=generator(4))))
             roughness = torch.full((len(n), 1), rho)
-            lobes = query_direction(n, view, roughness)
+            lobes = light_queries(n, view, roughness)[0][: len(n)]
             got = bits(OcclusionQuery(torch.empty(0), x, n, lobes, roughness))
             o_d, o_s = occlusion_factors(
                 scene_of(mesh),

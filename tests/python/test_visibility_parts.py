@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, RaySegments, VisibilityBits
 from splitnerf.fields import visibility
 from splitnerf.fields.light import lobe_roughness, panorama_directions
-from splitnerf.ops import VisibilityCache, cached_occlusion, cached_visibility, query_direction
+from splitnerf.ops import VisibilityCache, cached_occlusion, cached_visibility, light_queries
 
 
 def dented() -> trimesh.Trimesh:
@@ -282,7 +282,7 @@ def test_each_emitter_sends_what_it_reflects(monkeypatch, chunk):
         assert all((b is previous is None) or torch.equal(b, previous) for b in before)
         o_d, _, i_d, _ = cached_occlusion(cache, x, n, n, rho, bits.light, previous)
         light_d = (o_d * light(n, up) + (0 if i_d is None else i_d))[at]
-        sky = light(query_direction(n[at], views, rho[at]), (rho[at] ** 4 + 1 / 256) ** 0.25)
+        sky = light(light_queries(n[at], views, rho[at])[0][: len(at)], (rho[at] ** 4 + 1 / 256) ** 0.25)
         shown = torch.zeros_like(sky) if previous is None else previous[emitters.mirrored.clamp(min=0)]
         light_s = torch.where((emitters.mirrored < 0)[:, None], sky, shown)
         for found, expected in zip(map(torch.cat, zip(*seen)), (n[at], views, *here, light_s, light_d)):

@@ -14,10 +14,10 @@ LEVELS, BASE, TABLE_SIZE = 6, 4, 2**9  # resolutions double
 
 
 def hash_encode(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    return {"features": hash_encode_jacobian(row, shared)["features"]}
+    return {"features": with_jacobian(row, shared)["features"]}
 
 
-def hash_encode_jacobian(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+def with_jacobian(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     """Features and their derivatives by position, which are 0 by a coordinate outside the cube."""
     given = vector(row["positions"])
     position = [min(max(x, mp.mpf(0)), mp.mpf(1)) for x in given]
@@ -66,30 +66,19 @@ def cells(position: list, table: np.ndarray):
 def sdf_values(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[str, list]:
     """The layer over the grid's features, of the table scaled by 1e-3 in float64."""
     weights = [[vector(weights) for weights in shared[name].numpy()] for name in ("hidden", "out")]
-    return {"values": layer(row["positions"], encoded(row, shared, box), *weights, shared, box=box)["outputs"][:1]}
+    return {"values": layer(row["positions"], in_box(row, shared, box), *weights, shared, box=box)["outputs"][:1]}
 
 
 def sdf_field(row: dict[str, np.ndarray], shared: Rows, box: int = 1) -> dict[str, list]:
     """The same with all outputs and the gradient; rows of weights are length times unit direction."""
     weights = [normalised(shared[name].numpy(), shared[f"{name}_length"].numpy()) for name in ("hidden", "out")]
-    features = encoded(row, shared, box)
+    features = in_box(row, shared, box)
     return {"features": features["features"]} | layer(row["positions"], features, *weights, shared, box=box)
 
 
-def encoded(row: dict[str, np.ndarray], shared: Rows, box: int) -> dict[str, list]:
+def in_box(row: dict[str, np.ndarray], shared: Rows, box: int) -> dict[str, list]:
     unit = {"positions": np.asarray(row["positions"], np.float64) / (2 * box) + 0.5}
-    return hash_encode_jacobian(unit, shared | {"table": 1e-3 * shared["table"]})
-
-
-def material_network(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    """Two layers of rectified units and sigmoids, the roughness brought to [.1, 1]."""
-    x = vector(row["features"])
-    for k in range(3):
-        weights, bias = (shared[f"{name}{k}"].numpy() for name in ("weight", "bias"))
-        x = [mp.fsum(w * a for w, a in zip(vector(of_unit), x)) + mp.mpf(float(b)) for of_unit, b in zip(weights, bias)]
-        x = [max(a, 0) if k < 2 else 1 / (1 + mp.exp(-a)) for a in x]
-    least = mp.mpf("0.1")
-    return {"albedo": x[:3], "roughness": [least + (1 - least) * x[3]], "metallic": x[4:]}
+    return with_jacobian(unit, shared | {"table": 1e-3 * shared["table"]})
 
 
 def normalised(directions: np.ndarray, lengths: np.ndarray) -> list[list]:

@@ -59,32 +59,10 @@ def gradient_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
     }
 
 
-def material_losses(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    metallic, shares = vector(row["metallic"]), vector(row["shares"])
-    total = max(mp.fsum(shares), mp.mpf("1e-8"))
-    darkness = [max(1 - max(vector(albedo)) / mp.mpf("0.4"), mp.mpf(0)) for albedo in row["albedo"]]
-    terms = {
-        "metal": [m * m for m in metallic],
-        "binary": [m * (1 - m) for m in metallic],
-        "dark": [m * d for m, d in zip(metallic, darkness)],
-        "metal, smooth L1": [m * m / 2 for m in metallic],
-    }
-    return {name: [mp.fsum(s * v for s, v in zip(shares, values)) / total] for name, values in terms.items()}
-
-
 def quadratic_entropy(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     points = [vector(x) for x in row["x"]]
     likeness = [mp.exp(-mp.fsum((a - b) ** 2 for a, b in zip(p, q)) / 4) for p in points for q in points]
     return {"entropy": [-mp.log(mp.fsum(likeness) / len(points) ** 2)]}
-
-
-def log_chroma(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    terms = []
-    for radiance in row["radiance"]:
-        logs = [mp.log(x + mp.mpf("1e-6")) for x in vector(radiance)]
-        mean = mp.fsum(logs) / 3
-        terms += [(x - mean) ** 2 for x in logs]
-    return {"chroma": [mp.fsum(terms) / len(terms)]}
 
 
 def light_prior(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:

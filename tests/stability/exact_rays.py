@@ -8,8 +8,13 @@ from stability.entry import Rows
 from stability.precise import mp, vector
 
 
-def neus_weights(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    return weights_of(vector(row["f_prev"]), vector(row["f_next"]), mp.mpf(float(shared["s"])))
+def weights_along_z(row: dict[str, np.ndarray], shared: Rows, step: float) -> dict[str, list]:
+    """Of gradients (1, 0, slope) and a ray along z."""
+    before, after = [], []
+    for f, slope in zip(vector(row["sdf"]), vector(row["slope"])):
+        half = mp.mpf(step) / 2 * max(-slope / mp.sqrt(1 + slope**2 + mp.mpf("1e-12")), 0)
+        before.append(f + half), after.append(f - half)
+    return weights_of(before, after, mp.mpf(float(shared["s"])))
 
 
 def weights_of(f_prev: list, f_next: list, s) -> dict[str, list]:
@@ -40,10 +45,6 @@ def surface_weights(row: dict[str, np.ndarray], shared: Rows, step: float, annea
 def log_sigmoid(x):
     """log(1 / (1 + exp(-x)))."""
     return -mp.log1p(mp.exp(-x)) if x > 0 else x - mp.log1p(mp.exp(x))
-
-
-def sharpness(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    return {"s": [mp.exp(min(max(10 * v, mp.mpf(0)), mp.mpf(9))) for v in vector(row["variance"])]}
 
 
 def composite(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:

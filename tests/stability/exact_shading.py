@@ -34,7 +34,7 @@ def turned(normal: list, view: list) -> tuple[list, object]:
     return ([-x for x in normal], -cosine) if cosine < 0 else (normal, cosine)
 
 
-def query_direction(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
+def light_queries(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     view, roughness = vector(row["view_dirs"]), mp.mpf(float(row["roughness"][0]))
     normal, cosine = turned(vector(row["normals"]), view)
     mirror = [2 * cosine * n - v for n, v in zip(normal, view)]
@@ -92,19 +92,6 @@ def shade_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
             values.append(metallic * metal + (1 - metallic) * (coat * dielectric + base))
     share = mp.mpf(float(row["share"][0]))
     return out | {"mixed": [(x - other) * share for x, other in zip(out["compensated"], vector(row["other"]))]}
-
-
-def specular_share(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    """What single scattering reflects, of all that is reflected, between .1 and .95."""
-    view, metallic = vector(row["view_dirs"]), mp.mpf(float(row["metallic"][0]))
-    f1, f2, _, layer = table(turned(vector(row["normals"]), view)[1], mp.mpf(float(row["roughness"][0])))
-    coat = layer * gain(mp.mpf("0.04"), f1, f2, True)
-    single = whole = mp.mpf(0)
-    for albedo in vector(row["albedo"]):
-        metal = metallic * (albedo * f1 + f2)
-        single += metal + (1 - metallic) * coat
-        whole += metal * gain(albedo, f1, f2, True) + (1 - metallic) * (coat + (1 - coat) * albedo)
-    return {"share": [clipped(single / whole, mp.mpf("0.1"), mp.mpf("0.95"))]}
 
 
 def fresnel_dielectric(cosine):

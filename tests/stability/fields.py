@@ -16,7 +16,6 @@ from splitnerf.ops.hash_grid import rounded
 
 SPEC = ops.HashGridSpec(n_levels=6, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)
 WIDTH, OUTPUTS, BETA, BOX = 16, 5, 100.0, 1.0
-INPUTS = 12  # of the materials' network
 EDGES = (0.0, 1e-45, 1e-38, 1e-7, 0.5, 1 - 6e-8, 1.0, -1e-7, -3.0, 1 + 1.2e-7, 2.0, 1e30, -1e30)
 BY_CELL = "a coordinate times the resolution is rounded, which the condition holds; else a few roundings"
 
@@ -41,19 +40,14 @@ def encoded(rows: Rows, shared: Rows) -> Rows:
     return {"features": ops.hash_encode(rows["positions"], shared["table"], SPEC)}
 
 
-def with_jacobian(rows: Rows, shared: Rows, stored: torch.Tensor | None = None) -> Rows:
-    features, jacobian = ops.hash_encode_jacobian(rows["positions"], shared["table"], SPEC, stored=stored)
-    return {"features": features, "jacobian": jacobian}
-
-
 def from_16_bits(dtype: torch.dtype) -> Callable[[Rows, Rows], Rows]:
-    """:func:`with_jacobian` of a table that is read in 16 bits; in float64, of the same numbers."""
+    """:func:`encoded` with a table that is read in 16 bits; in float64, of the same numbers."""
 
     def call(rows: Rows, shared: Rows) -> Rows:
         table = shared["table"]
         if table.dtype == torch.float32:
-            return with_jacobian(rows, shared, rounded(table, dtype))
-        return with_jacobian(rows, {"table": table + (rounded(table, dtype).double() - table).detach()})
+            return {"features": ops.hash_encode(rows["positions"], table, SPEC, stored=rounded(table, dtype))}
+        return encoded(rows, {"table": table + (rounded(table, dtype).double() - table).detach()})
 
     return call
 
@@ -90,24 +84,6 @@ def field(rows: Rows, shared: Rows) -> Rows:
     return {"outputs": outputs, "features": features, "gradient": gradient}
 
 
-def draw_features(draw: Draw, n: int) -> Rows:
-    """Numbers of all sizes, so that the sums of some units are large and cancel in others."""
-    return {"features": draw.signs(n, INPUTS) * draw.mixed((0.0, 1e-38, 1e-7, 1.0, 100.0), draw.logarithmic(1e-6, 10, n, INPUTS))}
-
-
-@lru_cache(maxsize=1)
-def materials() -> Rows:
-    draw, sizes = Draw(6), (INPUTS, WIDTH, WIDTH, 5)
-    numbers = {f"weight{k}": draw.normal(sizes[k + 1], sizes[k]).float() / math.sqrt(sizes[k]) for k in range(3)}
-    return numbers | {f"bias{k}": draw.normal(sizes[k + 1]).float() for k in range(3)}
-
-
-def predicted(rows: Rows, shared: Rows) -> Rows:
-    weights, biases = ([shared[f"{name}{k}"] for k in range(3)] for name in ("weight", "bias"))
-    found = ops.material_network(rows["features"].split([3, INPUTS - 3], 1), weights, biases, 0.1)
-    return dict(zip(("albedo", "roughness", "metallic"), found))
-
-
 def values(rows: Rows, shared: Rows) -> Rows:
     weights = [shared[name] for name in ("hidden", "hidden_bias", "out", "out_bias")]
     field = ops.SdfNetwork(SPEC, SPEC.n_levels, 1e-3 * shared["table"], *weights, BETA, BOX)
@@ -134,9 +110,8 @@ def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> En
 LEARNED = ("hidden", "hidden_length", "hidden_bias", "out", "out_length", "out_bias")
 ENTRIES = (
     grid_entry("hash_encode", encoded, exact_fields.hash_encode),
-    grid_entry("hash_encode_jacobian", with_jacobian, exact_fields.hash_encode_jacobian),
     *(
-        grid_entry(f"hash_encode_jacobian, {name}", from_16_bits(dtype), exact_fields.hash_encode_jacobian, dtype)
+        grid_entry(f"hash_encode, {name}", from_16_bits(dtype), exact_fields.hash_encode, dtype)
         for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
     ),
     Entry(
@@ -151,18 +126,6 @@ ENTRIES = (
         exact=exact_fields.sdf_field,
         exact_bound=1e-11,
         reason="sums of 15 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
-    ),
-    Entry(  # no gradients: at the bend of a unit float32 and float64 may stand on different sides
-        "material_network",
-        draw=draw_features,
-        call=predicted,
-        shared=materials(),
-        conditioned=True,
-        bound=4e-6,
-        floor=1e-30,
-        exact=exact_fields.material_network,
-        exact_bound=1e-11,
-        reason="sums of up to 16 products, whose rounding the condition holds, and a sigmoid of slope up to 1/4",
     ),
     Entry(
         "sdf_values",

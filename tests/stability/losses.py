@@ -68,16 +68,6 @@ def field_gradients(rows: Rows, shared: Rows) -> Rows:
     )
 
 
-def draw_metals(draw: Draw, n: int) -> Rows:
-    return {"albedo": draw.shares(n, BATCH, 3), "metallic": draw.shares(n, BATCH, 1), "shares": draw.shares(n, BATCH)}
-
-
-def metals(rows: Rows, shared: Rows) -> Rows:
-    names = ("albedo", "metallic", "shares")
-    squared = batches(rows, names, ops.material_losses, ("metal", "binary", "dark"))
-    return squared | batches(rows, names, lambda *x: ops.material_losses(*x, smooth_l1=True)[:1], ("metal, smooth L1",))
-
-
 def draw_points(draw: Draw, n: int) -> Rows:
     """Points that coincide, touch, and lie up to 1e6 widths apart."""
     spread = draw.mixed((0.0, 1e-7, 1e-3, 1e6), draw.logarithmic(1e-3, 30, n, 1, 1))
@@ -85,20 +75,9 @@ def draw_points(draw: Draw, n: int) -> Rows:
     return {"x": x}
 
 
-def draw_light(draw: Draw, n: int) -> Rows:
-    """Radiance from nothing to 1e4, of each channel or nearly grey."""
-    radiance = draw.radiance(n, BATCH, 3, top=1e4)
-    grey = radiance[..., :1] * (1 + draw.pick((0.0, 1e-6, 1e-2), n, BATCH, 1) * draw.uniform(n, BATCH, 3))
-    return {"radiance": torch.where(draw.chance(0.3, n, 1, 1), grey, radiance)}
-
-
 def draw_texels(draw: Draw, n: int) -> Rows:
     """Log radiance beside the coarser levels: none, nearly none, ordinary, and more than any light has."""
     return {"texels": draw.pick((0.0, 1e-6, 1e-2, 1.0, 30.0), n, 1, 1) * draw.normal(n, POINTS, 3)}
-
-
-def repaired_shares(rows: Rows) -> Rows:
-    return {name: x.clamp(0, 1) for name, x in rows.items()}
 
 
 ENTRIES = (
@@ -137,23 +116,6 @@ ENTRIES = (
         reason=BY_CONDITION + "; of distances of unit vectors and of gradients of order 1 the error is absolute",
     ),
     Entry(
-        "material_losses",
-        draw=draw_metals,
-        call=metals,
-        smooth=("metallic",),
-        conditioned=True,
-        bound=2e-6,
-        gradient_bound=4e-6,
-        exact=exact_losses.material_losses,
-        exact_bound=1e-13,
-        size=BATCH,
-        chunk=256,
-        floor=1e-25,
-        gradient_floor=1e-25,
-        repair=repaired_shares,
-        reason=BY_CONDITION + "; shares that sum to less than 1e-8 count as that, and products of them underflow",
-    ),
-    Entry(
         "quadratic_entropy",
         draw=draw_points,
         smooth=("x",),
@@ -169,23 +131,6 @@ ENTRIES = (
         gradient_floor=1e-3,
         repair=lambda rows: {"x": rows["x"].clamp(-1e6, 1e6)},
         reason="the likeness of a pair is off by 2^-22 of itself; an entropy below 1 is a logarithm close to 0",
-    ),
-    Entry(
-        "log_chroma",
-        draw=draw_light,
-        smooth=("radiance",),
-        conditioned=True,
-        bound=2e-6,
-        gradient_bound=2e-5,
-        call=lambda rows, shared: batches(rows, ("radiance",), lambda x: (ops.log_chroma(x),), ("chroma",)),
-        exact=exact_losses.log_chroma,
-        exact_bound=1e-13,
-        size=BATCH,
-        chunk=256,
-        floor=0.1,
-        gradient_floor=100.0,
-        repair=lambda rows: {"radiance": rows["radiance"].clamp(0, 1e4)},
-        reason="logarithms of ratios; a chroma below 0.1 counts as that, as do gradients below 100 where the dark's reach 1e4",
     ),
     Entry(
         "light_prior",

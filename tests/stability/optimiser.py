@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from splitnerf import ops
+from splitnerf.ops._library import lib
 from stability.cases import Draw
 from stability.entry import Entry, Rows
 from stability.precise import mp, vector
 
 NAMES = ("param", "grad", "exp_avg", "exp_avg_sq")
-SETTINGS = dict(lr=0.01, beta1=0.9, beta2=0.99, eps=1e-15, weight_decay=0.01)
+RATE, BETAS, EPS, DECAY = 0.01, (0.9, 0.99), 1e-15, 0.01
 STEPS = (1, 3000)
 LARGEST = {"param": 1e6, "grad": 1e18, "exp_avg": 1e18, "exp_avg_sq": 1e36}
 EDGES = (0.0, 1e-45, 1e-38, 1e-30, 1e-15, 1e-7, 1.0, 1e18)
@@ -36,14 +36,16 @@ def stepped(rows: Rows, shared: Rows) -> Rows:
     for step in STEPS:
         for sparse in (False, True):
             param, grad, exp_avg, exp_avg_sq = (rows[name].clone() for name in NAMES)
-            ops.adamw_step_(param, grad, exp_avg, exp_avg_sq, **SETTINGS, step=step, sparse=sparse)
+            lib.adamw_steps_(
+                [param], [grad], [exp_avg], [exp_avg_sq], [RATE], *BETAS, EPS, [DECAY], [step], [sparse], [], []
+            )
             kind = f"step {step}{', sparse' * sparse}"
             out |= {f"param, {kind}": param, f"exp_avg, {kind}": exp_avg, f"exp_avg_sq, {kind}": exp_avg_sq}
     return out
 
 
 def exactly(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    lr, beta1, beta2, eps, decay = (mp.mpf(value) for value in SETTINGS.values())
+    lr, beta1, beta2, eps, decay = (mp.mpf(value) for value in (RATE, *BETAS, EPS, DECAY))
     numbers = list(zip(*(vector(row[name]) for name in NAMES)))
     still = all(g == 0 for _, g, _, _ in numbers)
     out: dict[str, list] = {}
@@ -64,7 +66,7 @@ def exactly(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
 
 ENTRIES = (
     Entry(
-        "adamw_step_",
+        "adamw_steps_",
         draw=draw_parameters,
         call=stepped,
         repair=repaired,

@@ -84,7 +84,7 @@ def closed_cube(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     edge = (targets.abs() > HALF * (1 - 1e-5)).sum(1, keepdim=True) > 1
     parallel = draw.chance(0.5, n, 1) & ~edge  # to four of the faces; in the plane of one a ray may be either
     directions = torch.where(parallel, -normals, inside - origins)
-    open_ = ops.trace_visibility(cube(), origins.float(), directions.float())
+    open_ = cube().is_open(origins.float(), directions.float())
     return open_.double(), {"origins": origins.float(), "directions": directions.float()}
 
 
@@ -93,7 +93,7 @@ def open_outside(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     origins = points + normals * draw.pick((1e-4, 1e-2, 1.0), n, 1)
     side = unit(draw.normal(n, 3) * (normals == 0))
     directions = unit(normals + side * draw.mixed((0.0, 1e-7, 1.0, 1e3), draw.logarithmic(1e-3, 1e3, n, 1)))
-    open_ = ops.trace_visibility(cube(), origins.float(), directions.float())
+    open_ = cube().is_open(origins.float(), directions.float())
     return 1.0 - open_.double(), {"origins": origins.float(), "directions": directions.float()}
 
 
@@ -276,41 +276,13 @@ def read_photos(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.where(wrong, 1.0, error - 1.2e-7), {"index": index, "random": random}
 
 
-def probes(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """In the cube, and as far away as the two numbers of a radius say, to a rounding."""
-    cube, shifts = draw.shares(n, 3).clamp(max=1 - 6e-8).float(), draw.shares(n, 4).clamp(max=1 - 6e-8).float()
-    anywhere, moved = ops.probe_points(torch.cat([cube.flatten(), shifts.flatten()]), n, 1.5, 0.25)
-    expected = 3 * cube.double() - 1.5
-    radius = 0.25 * torch.sqrt(-2 * torch.log1p(-shifts[:, ::2].double()))
-    length = moved[:, :2].double().norm(dim=1)
-    third = (radius[:, 1] * torch.cos(2 * torch.pi * shifts[:, 3].double()) - moved[:, 2]).abs() - 2e-6
-    error = torch.maximum((anywhere - expected).abs().amax(1) - 1e-6, (length - radius[:, 0]).abs() - 2e-6)
-    return torch.maximum(error, third), {"cube": cube, "shifts": shifts}
-
-
-def placed(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """As far along its ray as the middle of its sample, to a rounding of the numbers added."""
-    rows = {
-        "rays_o": draw.vectors(n).clamp(-1e18, 1e18).float(), "rays_d": draw.directions(n).float(),
-        "t_starts": draw.logarithmic(1e-20, 1e18, n).float(),
-    }  # fmt: skip
-    ends = rows["t_starts"] * (1 + draw.shares(n)).float()
-    samples = ops.PackedSamples(torch.arange(n), rows["t_starts"], ends, torch.arange(n + 1))
-    none = rows["rays_o"][:0]
-    positions, directions, _ = ops.place_samples(rows["rays_o"], rows["rays_d"], samples, none, none[:, 0], none)
-    o, d = rows["rays_o"].double(), rows["rays_d"].double()
-    along = d * (0.5 * (rows["t_starts"].double() + ends.double()))[:, None]
-    error = ((positions.double() - (o + along)).abs() - 3e-7 * (o.abs() + along.abs())).amax(1)
-    return torch.where((directions == rows["rays_d"]).all(1), error, 1.0), rows
-
-
 def queries_of_light(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """The directions of query_direction with their roughness; the normals, not behind the surface, with 1."""
+    """The points' own roughness, then 1; the normals, not behind the surface."""
     given = draw.directions(n).float(), draw.directions(n).float(), draw.roughness(n).float()
     directions, asked = ops.light_queries(*given)
-    lobes, facing = directions.chunk(2)
+    facing = directions[n:]
     turned = (facing == given[0]).all(1) | (facing == -given[0]).all(1)
-    same = (lobes == ops.query_direction(*given)).all(1) & (asked[:n] == given[2]).all(1) & (asked[n:] == 1).all(1)
+    same = (asked[:n] == given[2]).all(1) & (asked[n:] == 1).all(1)
     behind = -(facing.double() * given[1].double()).sum(1) - 4e-7
     return torch.where(same & turned, behind, 1.0), dict(zip(("normals", "view_dirs", "roughness"), given))
 
@@ -330,33 +302,6 @@ def spread(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.where((drawn < 1) | (found.first > found.second).reshape(n, samples).any(1), 1.0, wrong), {
         "weights": weights.reshape(n, samples)
     }
-
-
-def shares_of_lobes(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """All with their shares by float64 to some roundings, exactly 0 and 1 outside the band; those without one are left out."""
-    roughness, every = draw.mixed((0.3, 0.3 + 6e-8, 0.375, 0.45, 0.45 - 6e-8), draw.roughness(n)).float(), torch.arange(n)
-    at, share = ops.wide_lobes(every, roughness, 0.3, 0.45, torch.tensor(n))
-    t = ((roughness.double()[:, 0] - 0.3) / 0.15).clamp(0, 1)
-    error = (share.double() - t * t * (3 - 2 * t)).abs() - 2e-6
-    wrong = (at != every) | ((roughness[:, 0] < 0.2999999) & (share != 0)) | ((roughness[:, 0] > 0.4500001) & (share != 1))
-    left, shares = ops.wide_lobes(every, roughness, 0.3, 0.45)
-    wrong |= (torch.zeros(n).index_add(0, left, shares) != share) | (torch.bincount(left, minlength=n) != (share > 0))
-    return torch.where(wrong, 1.0, torch.maximum(error, finite_in(share[:, None], 0.0, 1.0))), {"roughness": roughness}
-
-
-def added_corrections(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """mean + correction sum(weights) / max(opacity, 1e-4) by float64 to some roundings, of two segments the first one. Weights
-    without a normal float count as 0."""
-    mean, correction = draw.radiance(n, 3).float(), (draw.signs(n, 3) * draw.radiance(n, 3)).float()
-    weights, opacity, every = draw.shares(n, 4).float(), draw.shares(n).float(), torch.arange(4 * n)
-    weights = torch.where(weights < 1e-30, 0.0, weights)
-    found = ops.add_corrections(
-        mean, correction, every[1::4], every, every // 4, every // 2, weights.reshape(-1), opacity, 1e-4
-    )
-    part = weights[:, :2].double().sum(1) / opacity.double().clamp(min=1e-4)
-    added = correction.double() * part[:, None]
-    error = (found.double() - (mean.double() + added)).abs() - 4e-7 * (mean.double().abs() + added.abs()) - 1e-38
-    return error.amax(1), {"mean": mean, "correction": correction, "weights": weights, "opacity": opacity[:, None]}
 
 
 def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
@@ -379,30 +324,11 @@ def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.stack([bent, length, below]).amax(0), {"axes": axes, "roughness": roughness}
 
 
-def bsdf_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Unit vectors, densities finite and not below 0, above the horizon at least the cosine's times its share."""
-    normals = draw.directions(n)
-    rows = {
-        "normals": normals.float(),
-        "view_dirs": draw.at_cosine(normals).float(),
-        "roughness": draw.roughness(n).float(),
-        "specular_share": draw.shares(n, 1).float(),
-    }
-    found, pdf = ops.sample_bsdf(*rows.values(), 8, int(draw.uniform(1).item() * 1e9))
-    sign = torch.where((rows["normals"].double() * rows["view_dirs"].double()).sum(1, keepdim=True) < 0, -1.0, 1.0)
-    cosine = ((rows["normals"].double() * sign)[:, None] * found.double()).sum(-1)
-    least = (1 - rows["specular_share"].double()) * cosine / torch.pi * (1 - 1e-5) - 1e-6
-    clear = (rows["normals"].double() * rows["view_dirs"].double()).sum(1).abs() > 1e-6  # whether the normal is turned
-    low = torch.where(clear, (least - pdf.double()).amax(1), -1.0)
-    length = (found.double().norm(dim=-1) - 1).abs().amax(1) - 2e-6
-    return torch.stack([low, length, finite_in(pdf, 0.0, 3e38)]).amax(0), rows
-
-
 PROPERTIES = (
     Property(
-        "trace_visibility, closed", closed_cube, "no ray into a closed cube leaks, through vertices and edges either"
+        "MeshScene.is_open, closed", closed_cube, "no ray into a closed cube leaks, through vertices and edges either"
     ),
-    Property("trace_visibility, open", open_outside, "every ray away from a face of a convex body is open"),
+    Property("MeshScene.is_open, open", open_outside, "every ray away from a face of a convex body is open"),
     Property("occlusion_factors", shares, "in [0, 1] under black, dim, bright and single lights", chunk=1024),
     Property("occlusion_factors, blocked", all_blocked, "0 where all rays are blocked, in black light too", chunk=1024),
     Property(
@@ -421,15 +347,10 @@ PROPERTIES = (
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
     Property("draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"),
     Property("read_pixels", read_photos, "the value of its code, its photo's factors, its own colour behind it where it has one"),
-    Property("probe_points", probes, "in the cube; as long as Box and Muller's formula, to a rounding"),
-    Property("place_samples", placed, "on the ray in the middle of the sample, to a rounding"),
-    Property("light_queries", queries_of_light, "those of query_direction, then normals that do not face away"),
-    Property("wide_lobes", shares_of_lobes, "the smoothstep's shares, in [0, 1]; without a number those with one"),
-    Property("add_corrections", added_corrections, "the mean and the correction by its segment's share, to a rounding"),
+    Property("light_queries, normals", queries_of_light, "normals that do not face away, with a roughness of 1"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),
-    Property("sample_bsdf", bsdf_samples, "unit; the density is finite and at least the cosine's share", size=8),
 )
 
 

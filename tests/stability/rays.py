@@ -15,6 +15,7 @@ from stability.entry import Entry, Rows
 SAMPLES = 8  # of a ray
 LONG = 10_000  # samples of a long ray
 STEP = 1 / 128
+WIDEST = 4e6  # length of a sample over which the distance may fall by half as much
 LEAST = 1e-4  # opacity
 BY_DEPTH = "a rounding of s f moves a weight by s f 2^-24, which the condition holds; else a few roundings"
 BY_NORMAL = "absolute: a rounding of the normal moves a depth by s step 2^-23; gradients of up to s are differences"
@@ -35,22 +36,38 @@ def fields(draw: Draw, n: int, samples: int) -> Tensor:
     return torch.where(kind < 0.4, falling, torch.where(kind < 0.7, fog, wild))
 
 
-def draw_neus(draw: Draw, n: int, samples: int = SAMPLES) -> Rows:
-    values = fields(draw, n, samples)
-    return {"f_prev": values[:, :-1], "f_next": values[:, 1:]}
+def between_ends(f_prev: Tensor, f_next: Tensor, step: float) -> Rows:
+    """The distance in the middle, and the slope along the ray of a gradient that is 1 across it."""
+    cosine = (f_next - f_prev) / step
+    return {"sdf": 0.5 * (f_prev + f_next), "slope": cosine / torch.sqrt(1 - cosine**2)}
 
 
-def draw_long(draw: Draw, n: int) -> Rows:
+def draw_ends(draw: Draw, n: int, step: float, s: float = 1.0) -> Rows:
+    values = fields(draw, n, SAMPLES).clamp(-60, 60) / s  # beyond, the ends have lost the digits of their difference
+    return between_ends(values[:, :-1], values[:, 1:], step)
+
+
+def draw_long(draw: Draw, n: int, step: float) -> Rows:
     """Fog of ten thousand samples, from hardly any to opaque in a few steps."""
     depth = draw.logarithmic(1e-9, 1e-2, n, 1).expand(n, LONG)
     f = draw.uniform(n, 1, low=-2, high=2) + 0 * depth
-    return {"f_prev": f + depth * draw.uniform(n, LONG, low=0.9, high=1.1), "f_next": f}
+    return between_ends(f + depth * draw.uniform(n, LONG, low=0.9, high=1.1), f, step)
 
 
-def weights(rows: Rows, shared: Rows) -> Rows:
+def along_z(rows: Rows) -> tuple[Tensor, Tensor]:
+    """Gradients [n, samples, 3] and directions [n, 3] of rays along z."""
+    slope = rows["slope"]
+    gradient = torch.stack([torch.ones_like(slope), torch.zeros_like(slope), slope], -1)
+    return gradient, torch.tensor([[0.0, 0.0, 1.0]]).to(slope).expand(len(slope), 3)
+
+
+def weights(rows: Rows, shared: Rows, step: float) -> Rows:
     """The sharpness is shared by all rays of a call: that of s f is asked with s = 1, that of s beside."""
-    n, samples = rows["f_prev"].shape
-    w, opacity = ops.neus_weights(rows["f_prev"].flatten(), rows["f_next"].flatten(), shared["s"], offsets(n, samples))
+    n, samples = rows["sdf"].shape
+    gradient, rays_d = along_z(rows)
+    _, w, opacity = ops.surface_weights(
+        rows["sdf"].flatten(), gradient.reshape(-1, 3), rays_d, shared["s"], offsets(n, samples), step=step
+    )
     return {"weights": w.reshape(n, samples), "opacity": opacity[:, None]}
 
 
@@ -115,19 +132,19 @@ def means(rows: Rows, shared: Rows) -> Rows:
     return {"means": found}
 
 
-def neus(name: str, s: float, draw, **changes) -> Entry:
+def ends_entry(name: str, s: float, draw, step: float, **changes) -> Entry:
     options = {
         "bound": 4e-6,
         "gradient_bound": 8e-6,
         "floor": 1e-30,
         "gradient_floor": 1e-30 * s,
-        "exact": exact_rays.neus_weights,
+        "exact": partial(exact_rays.weights_along_z, step=step),
     }
     return Entry(
         name,
-        draw=draw,
-        call=weights,
-        smooth=("f_prev", "f_next"),
+        draw=partial(draw, step=step),
+        call=partial(weights, step=step),
+        smooth=("sdf", "slope"),
         smooth_shared=("s",),
         shared={"s": torch.tensor(s)},
         conditioned=True,
@@ -159,10 +176,10 @@ def surface_entry(name: str, s: float, anneal: float) -> Entry:
 
 
 ENTRIES = (
-    neus("neus_weights", 1.0, draw_neus),
-    neus("neus_weights, s = 8000", 8000.0, lambda draw, n: {k: x / 8000 for k, x in draw_neus(draw, n).items()}),
-    neus("neus_weights, 10^4 samples", 64.0, draw_long, size=LONG, chunk=8, exact=None),
     surface_entry("surface_weights", 200.0, 1.0),
+    ends_entry("surface_weights, any ends", 1.0, draw_ends, WIDEST),
+    ends_entry("surface_weights, any ends, s = 8000", 8000.0, partial(draw_ends, s=8000.0), WIDEST / 8000),
+    ends_entry("surface_weights, 10^4 samples", 64.0, draw_long, 1.0, size=LONG, chunk=8, exact=None),
     surface_entry("surface_weights, annealed", 20.0, 0.3),
     Entry(
         "composite",
@@ -188,19 +205,6 @@ ENTRIES = (
         exact_bound=1e-14,
         repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
         reason="a sum in float64 and one division",
-    ),
-    Entry(
-        "sharpness",
-        draw=lambda draw, n: {"variance": draw.mixed((-1.0, 0.0, 2.0), draw.uniform(n, 1, low=-0.1, high=0.89))},
-        call=lambda rows, shared: {"s": ops.sharpness(rows["variance"])},
-        smooth=("variance",),
-        conditioned=True,
-        bound=4e-7,
-        gradient_bound=2e-6,
-        exact=exact_rays.sharpness,
-        exact_bound=1e-14,
-        repair=lambda rows: {"variance": rows["variance"].clamp(-1, 0.89)},
-        reason="an exponential of a number up to 9, which is rounded once; at .9, where the slope ends, the side is a rounding's",
     ),
     Entry(
         "composite, 10^4 samples",

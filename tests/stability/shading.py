@@ -10,6 +10,7 @@ from stability import exact_shading
 from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
 from splitnerf.ops._library import lib
+from reference import drawn_directions
 
 UNITS = ("normals", "view_dirs", "light_dirs")
 IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d", "share")
@@ -73,11 +74,11 @@ def within_the_light(rows: Rows) -> Rows:
 
 
 def draw_lit(draw: Draw, n: int) -> Rows:
-    """Points with a few directions each, those of the operator itself or extreme ones, with their densities."""
+    """Points with a few directions each, drawn for their materials or extreme ones, with their densities."""
     rows = surface(draw, n)
     names = ("normals", "view_dirs", "roughness")
-    given = (*(rows[name] for name in names), draw.shares(n, 1))
-    sampled, pdf = ops.sample_bsdf(*(x.float() for x in given), SAMPLES, int(draw.uniform(1).item() * 1e9))
+    given, seed = (rows[name].float() for name in names), int(draw.uniform(1).item() * 1e9)
+    sampled, pdf = drawn_directions(*given, draw.uniform(1).item(), SAMPLES, seed)
     own = draw.at_cosine(rows["normals"].repeat_interleave(SAMPLES, 0)).reshape(n, SAMPLES, 3)
     wild = draw.chance(0.3, n, SAMPLES)
     return rows | {
@@ -102,13 +103,10 @@ def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
     return {name: lib.shade_sums(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
 
 
-def share_of_lobe(rows: Rows, shared: Rows) -> Rows:
-    return {"share": lib.specular_share(*(rows[name] for name in SHADED), shared["lut"].float())}
-
-
 def directions(rows: Rows, shared: Rows) -> Rows:
     given = (rows["normals"], rows["view_dirs"], rows["roughness"])
-    return {query: lib.query_direction(*given, shared["lut"].float(), query == "mean") for query in ops.QUERIES}
+    n, lut = len(given[0]), shared["lut"].float()
+    return {query: lib.light_queries(*given, lut, query == "mean")[0][:n] for query in ops.QUERIES}
 
 
 def light_sums(rows: Rows, shared: Rows) -> Rows:
@@ -156,16 +154,16 @@ def draw_srgb(draw: Draw, n: int) -> Rows:
 
 ENTRIES = (
     Entry(
-        "query_direction",
+        "light_queries",
         draw=surface,
         call=directions,
         shared=TABLE,
-        smooth=("normals", "view_dirs", "roughness"),
+        smooth=("normals", "roughness"),
         repair=repaired,
         conditioned=True,
         bound=2e-6,
         gradient_bound=4e-6,
-        exact=exact_shading.query_direction,
+        exact=exact_shading.light_queries,
         exact_bound=1e-14,
         gradient_floor=1.0,
         reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
@@ -195,18 +193,6 @@ ENTRIES = (
         smooth=(*SHADED, *ops.LightSums._fields, "other"),
         gradient_bound=4e-6,
         exact=exact_shading.shade_sums,
-        exact_bound=1e-14,
-        reason=BY_CONDITION,
-    ),
-    Entry(
-        "specular_share",
-        draw=draw_material,
-        call=share_of_lobe,
-        shared=TABLE,
-        repair=repaired,
-        conditioned=True,
-        bound=2e-6,
-        exact=exact_shading.specular_share,
         exact_bound=1e-14,
         reason=BY_CONDITION,
     ),

@@ -159,19 +159,4 @@ template <int I, class T> SPLITNERF_HD T trilinear_backward(const Trilinear<T>& 
   return wz * (wy * (wx * grad.value + along_x) + wx * along_y) + wy * (wx * along_z);
 }
 
-// Trilinear weight of corner i, and its first and mixed second derivatives in the position.
-// (The pure second derivatives vanish.)
-template <class T> struct CornerWeight {
-  T value;
-  Vec3<T> d;  // d/dx, d/dy, d/dz
-  T dxy, dxz, dyz;
-};
-
-template <class T> SPLITNERF_HD CornerWeight<T> corner_weight_derivatives(const HashCell<T>& cell, int i) {
-  const T wx = i & 1 ? cell.f.x : T(1) - cell.f.x, sx = i & 1 ? cell.scale.x : -cell.scale.x;
-  const T wy = i & 2 ? cell.f.y : T(1) - cell.f.y, sy = i & 2 ? cell.scale.y : -cell.scale.y;
-  const T wz = i & 4 ? cell.f.z : T(1) - cell.f.z, sz = i & 4 ? cell.scale.z : -cell.scale.z;
-  return {wx * wy * wz, {sx * wy * wz, wx * sy * wz, wx * wy * sz}, sx * sy * wz, sx * wy * sz, wx * sy * sz};
-}
-
 }  // namespace splitnerf

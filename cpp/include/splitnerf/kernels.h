@@ -8,7 +8,6 @@
 #include "splitnerf/config.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/light_pyramid.h"
-#include "splitnerf/material_network.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/sdf_layer.h"
 #include "splitnerf/split_sum.h"
@@ -66,10 +65,9 @@ template <class T> struct Kernels {
 
   // features [n, C]; jacobian [n, 3, C] or null; columns of closed levels become 0. Points [begin, end).
   void (*hash_encode)(const HashEncodeArgs<T>&, int64_t begin, int64_t end, T* features, T* jacobian);
-  // Adds to grad_table. grad_features and grad_jacobian may be null. Level `level`, all points.
-  void (*hash_scatter)(const HashEncodeArgs<T>&, int level, const T* grad_features, const T* grad_jacobian,
-                       T* grad_table);
-  // The same where the gradient to the derivative by an axis is slopes times along [n, 3].
+  // Adds to grad_table. Level `level`, all points.
+  void (*hash_scatter)(const HashEncodeArgs<T>&, int level, const T* grad_features, T* grad_table);
+  // The same with a gradient to the derivative by each axis: slopes times along [n, 3].
   void (*hash_scatter_along)(const HashEncodeArgs<T>&, int level, const LevelPlanes<const T>& grad, const T* along,
                              T* grad_table);
   // values [n] at positions [n, 3], scene units; n <= kSdfBlock, work [sdf_work_size].
@@ -82,11 +80,6 @@ template <class T> struct Kernels {
   // likeness[j] = k_ij = exp(-|x_i - x_j|^2 / 4), i = point, work memory of n; sums = {sum_j k_ij (x_i - x_j) for each
   // channel, sum_j k_ij}. planes [n_channels, n] hold x.
   void (*pair_likeness)(int64_t n, int64_t n_channels, const T* planes, int64_t point, T* likeness, T* sums);
-  // inputs [n, input_columns] of the first layer, padded -> outputs [n, 5]; n <= kMaterialBlock, work [material_work_size].
-  void (*material_network)(const MaterialNetwork<T>&, int64_t n, const T* inputs, T* work, T* outputs);
-  // grad_outputs [n, 5] -> grad_inputs [n, input_columns], overwritten; adds to grads [grad_size].
-  void (*material_network_backward)(const MaterialNetwork<T>&, int64_t n, const T* inputs, const T* grad_outputs,
-                                    T* work, T* grad_inputs, T* grads);
   // sums[i - begin] = {sum K r, sum K g, sum K b, sum K} over the sources, for queries [begin, end).
   void (*lobe_gather)(const LobeSide<T>& queries, const LobeSide<T>& lights, int64_t begin, int64_t end, T* sums);
   // sums[i - begin] = {sum K r, sum K g, sum K b} over the queries, for lights [begin, end).

@@ -1,4 +1,4 @@
-// Terms of the training loss, each with its gradient: of pixels, of the field's gradients, and of materials.
+// Terms of the training loss, each with its gradient: of pixels and of the field's gradients.
 #pragma once
 
 #include "splitnerf/neus.h"
@@ -78,25 +78,6 @@ template <class T> SPLITNERF_HD NormalDistance<T> normal_distance(Vec3<T> here, 
   const T cos_half = std::sqrt(T(0.5) * (T(1) + cosine));  // a NaN goes on to the caller
   const T scale = sine > T(0) ? cos_half / sine : T(0);
   return {true, sine / cos_half, cross(n, axis) * (scale * per_here), cross(axis, m) * (scale * per_there)};
-}
-
-// ---- materials -------------------------------------------------------------------------------
-
-inline constexpr double kDarkestMetal = 0.4;  // normal reflectance
-
-// Penalties of a metallic m in [0, 1] and their slopes: m^2 (or the smooth L1 of m, half of that below 1), m (1 - m), and
-// m (1 - F0 / .4)+, F0 the brightest channel of the albedo, taken as given.
-//   Sources: SplitNeRF Eq. (18); common metals reflect half of the light and more (Akenine-Moller et al., Real-Time
-//   Rendering, 4th ed., table 9.2).
-template <class T> struct MaterialLosses {
-  T metal, binary, dark;
-  T metal_slope, binary_slope, dark_slope;
-};
-template <class T> SPLITNERF_HD MaterialLosses<T> material_losses(Vec3<T> albedo, T metallic, bool smooth_l1) {
-  const T scale = smooth_l1 ? T(0.5) : T(1), brightest = max_of(albedo.x, max_of(albedo.y, albedo.z));
-  const T darkness = max_of(T(1) - brightest / T(kDarkestMetal), T(0));
-  return {scale * square(metallic), metallic - square(metallic), metallic * darkness,
-          T(2) * scale * metallic,  T(1) - T(2) * metallic,      darkness};
 }
 
 }  // namespace splitnerf

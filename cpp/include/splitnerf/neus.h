@@ -12,24 +12,18 @@ template <class T> SPLITNERF_HD T sigmoid(T x) {
 }
 template <class T> SPLITNERF_HD T softplus(T x) { return max_of(x, T(0)) + std::log1p(std::exp(-std::abs(x))); }
 
-// s = exp(10 v) with 10 v in [0, 9], and its derivative, 0 outside.                    Source: NeuS, section 4.1.
-template <class T> struct Sharpness { T value, slope; };
-template <class T> SPLITNERF_HD Sharpness<T> sharpness(T variance) {
-  const T exponent = T(10) * variance, s = std::exp(clamp(exponent, T(0), T(9)));
-  return {s, exponent >= T(0) && exponent <= T(9) ? T(10) * s : T(0)};
-}
-
 // Optical depth of one interval, tau = -log(1 - alpha), alpha = (Phi(f_prev) - Phi(f_next))+ / Phi(f_prev),
 // Phi(f) = sigmoid(s f). In terms of d = s (f_prev - f_next)+ and x = s f_prev,
 //   1 - alpha = Phi(f_next) / Phi(f_prev) = 1 / (1 + X),   X = expm1(d) sigmoid(-x),
-// so tau = log1p(X); for d > 20, where expm1 would overflow, tau = softplus(-s f_next) - softplus(-x).
+// so tau = log1p(X). For d > 20, where expm1 would overflow, X = exp(d) sigmoid(-x), which is told by f_next in front of the surface
+// and by d behind it, where the distances may be so large that f_next has lost d.
 // Source: NeuS Eq. (13); the published form adds 1e-5 to both sides of the fraction.
-// apart = f_prev - f_next is an argument of its own, since some callers know it more exactly than the rounded
-// difference.
+// apart = f_prev - f_next, which callers know more exactly than the rounded difference.
 template <class T> SPLITNERF_HD T neus_optical_depth(T f_prev, T f_next, T apart, T s) {
   const T d = s * apart;
   if (!(d > T(0))) return d <= T(0) ? T(0) : d;  // a NaN goes on to the caller
-  if (d > T(20)) return max_of(softplus(-s * f_next) - softplus(-s * f_prev), T(0));
+  if (d > T(20))
+    return f_prev > T(0) ? softplus(-s * f_next) - softplus(-s * f_prev) : softplus(d - softplus(s * f_prev));
   return std::log1p(std::expm1(d) * sigmoid(-s * f_prev));
 }
 
@@ -52,15 +46,6 @@ template <class T> struct NeusInterval { T f_prev, f_next, apart; };
 template <class T> SPLITNERF_HD T neus_optical_depth(const NeusInterval<T>& interval, T s) {
   return neus_optical_depth(interval.f_prev, interval.f_next, interval.apart, s);
 }
-
-// Samples given by the distances at their ends; apart may be null.
-template <class T> struct NeusEnds {
-  const T *f_prev, *f_next, *apart;
-
-  SPLITNERF_HD NeusInterval<T> operator()(int64_t i) const {
-    return {f_prev[i], f_next[i], apart ? apart[i] : f_prev[i] - f_next[i]};
-  }
-};
 
 // The optical depth behind which samples get weight 0.
 template <class T> SPLITNERF_HD T neus_depth_limit(T min_transmittance) {

@@ -10,11 +10,9 @@
 #include "splitnerf/bodies/losses.h"
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/bodies/rays.h"
-#include "splitnerf/bodies/rows.h"
 #include "splitnerf/bodies/shading.h"
 #include "splitnerf/bodies/visibility_cache.h"
 #include "splitnerf/hash_grid.h"
-#include "splitnerf/material_network.h"
 #include "splitnerf/occlusion.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/run.h"
@@ -26,19 +24,19 @@ namespace splitnerf::cpu {
 
 // ---- hash grid. C = n_levels * n_features; columns of closed levels are written as 0. ----
 
-// positions [n, 3], table [n_entries, n_features] of T or of 16 bits -> features [n, C], jacobian [n, 3, C] or null.
+// positions [n, 3], table [n_entries, n_features] of T or of 16 bits -> features [n, C].
 template <class T>
 SPLITNERF_API void hash_encode(const HashGridShape& shape, int n_active, int64_t n, const T* positions, HashTable table,
-                               T* features, T* jacobian);
-// grad_features [n, C] and grad_jacobian [n, 3, C] (either may be null) -> grad_table, overwritten.
+                               T* features);
+// grad_features [n, C] -> grad_table, overwritten.
 // Levels are spread over the threads, so that no two threads write one entry: no atomics, and the same bits each time.
 template <class T>
 SPLITNERF_API void hash_encode_backward(const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                                        const T* grad_features, const T* grad_jacobian, T* grad_table);
+                                        const T* grad_features, T* grad_table);
 template <class T>
 SPLITNERF_API void hash_encode_backward_positions(const HashGridShape& shape, int n_active, int64_t n,
                                                   const T* positions, HashTable table, const T* grad_features,
-                                                  const T* grad_jacobian, T* grad_positions);
+                                                  T* grad_positions);
 
 // ---- pre-integrated light ----
 
@@ -91,18 +89,6 @@ template <class T>
 SPLITNERF_API void spread_samples(const SpreadArrays<T>& in, int64_t* sizes, int64_t* first, int64_t* second, T* share,
                                   const SpreadAllocator& allocator);
 
-// ---- materials ----
-
-// parts: the inputs, n_parts arrays [n, columns] as MaterialWeights says -> albedo [n, 3], roughness [n], metallic [n].
-template <class T>
-SPLITNERF_API void material_network(const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
-                                    const MaterialArrays<T>& to);
-// All gradients are overwritten. The weights' are summed over tasks of points that depend on n alone: the same bits on any number of
-// threads.
-template <class T>
-SPLITNERF_API void material_network_backward(const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
-                                             const MaterialArrays<const T>& grad, const MaterialGrads<T>& to);
-
 // ---- occlusion ----
 
 // positions, normals, lobe_dirs [n, 3], roughness [n], environment [height, width, 3] (radiance at
@@ -134,15 +120,11 @@ template <class T> SPLITNERF_API void shared_light_backward(int64_t n, const Sha
 
 // ---- bodies that run faster here than by their plain loop; the ratio stands in the file of each ----
 
-template <class T> SPLITNERF_API void run(int64_t n, const AdamwBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const AdamwListBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const CachedOcclusionBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const CachedVisibilityBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const LightLookupBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const PairLikenessBody<T>& body);
-template <class T> SPLITNERF_API void run(int64_t n, const TakeRowsBody<T>& body);
-template <class T> SPLITNERF_API void run(int64_t n, const ClearArraysBody<T>& body);
-template <class T> SPLITNERF_API void run(int64_t n, const AddRowsBody<T>& body);
 // Throws std::invalid_argument where a column is out of range.
 template <class T> SPLITNERF_API void run(int64_t n, const SparseProductBody<T>& body);
 template <class T> SPLITNERF_API void run(int64_t n, const ShadeBody<T>& body);

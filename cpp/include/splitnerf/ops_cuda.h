@@ -6,7 +6,7 @@
 #include "splitnerf/bodies/monte_carlo.h"
 #include "splitnerf/bodies/rays.h"
 #include "splitnerf/light_pyramid.h"
-#include "splitnerf/material_network.h"
+#include "splitnerf/hash_grid.h"
 #include "splitnerf/neus.h"
 #include "splitnerf/ray_walk.h"
 #include "splitnerf/run_cuda.h"
@@ -19,14 +19,13 @@ namespace splitnerf::cuda {
 
 template <class T>
 void hash_encode(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                 HashTable table, T* features, T* jacobian);
+                 HashTable table, T* features);
 template <class T>
 void hash_encode_backward(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n, const T* positions,
-                          const T* grad_features, const T* grad_jacobian, T* grad_table);
+                          const T* grad_features, T* grad_table);
 template <class T>
 void hash_encode_backward_positions(const Queue& queue, const HashGridShape& shape, int n_active, int64_t n,
-                                    const T* positions, HashTable table, const T* grad_features, const T* grad_jacobian,
-                                    T* grad_positions);
+                                    const T* positions, HashTable table, const T* grad_features, T* grad_positions);
 
 // ---- pre-integrated light; the backward pass of light_lookup adds atomically ----
 
@@ -64,16 +63,6 @@ void sdf_field(const Queue& queue, const SdfField<T>& field, int64_t n, const T*
 template <class T>
 void sdf_field_backward(const Queue& queue, const SdfField<T>& field, int64_t n, const T* positions,
                         const SdfOutputs<const T>& given, const SdfFieldGrad<T>& grad);
-
-// ---- materials; weights' gradients are added in an order that depends on n alone. A network too wide for a block's shared memory
-// throws std::invalid_argument ----
-
-template <class T>
-void material_network(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
-                      const MaterialArrays<T>& to);
-template <class T>
-void material_network_backward(const Queue& queue, const MaterialWeights<T>& weights, int64_t n, const T* const* parts,
-                               const MaterialArrays<const T>& grad, const MaterialGrads<T>& to);
 
 // ---- samples of rays through the distance field ----
 

@@ -65,8 +65,7 @@ template <class T> SPLITNERF_HD void store3(T* p, Vec3<T> v) {
   p[2] = v.z;
 }
 
-// Number or vector i of an array, or 0 where there is no array.
-template <class T> SPLITNERF_HD T load_if(const T* p, int64_t i) { return p ? p[i] : T(0); }
+// Vector i of an array, or 0 where there is no array.
 template <class T> SPLITNERF_HD Vec3<T> load3_if(const T* p, int64_t i) {
   return p ? load3(p + 3 * i) : Vec3<T>{T(0), T(0), T(0)};
 }

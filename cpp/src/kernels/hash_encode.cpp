@@ -180,20 +180,13 @@ void hash_encode(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* f
 }
 
 template <class T>
-void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, const T* grad_jacobian,
-                  T* grad_table) {
+void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, T* grad_table) {
   with_features(args.n_features, [&](auto count) {
     constexpr int F = decltype(count)::n;
     const int64_t n_columns = int64_t(args.n_levels) * F;
     const auto load = [&](int64_t b, int64_t n, LevelGrads<T, F>& to) {
-      for (int64_t p = 0; p < n; ++p) {
-        if (grad_features) copy_entry<F>(grad_features + (b + p) * n_columns + level * F, to.value + p * F);
-        if (!grad_jacobian) continue;
-        const T* row = grad_jacobian + 3 * (b + p) * n_columns + level * F;
-        copy_entry<F>(row, to.dx + p * F);
-        copy_entry<F>(row + n_columns, to.dy + p * F);
-        copy_entry<F>(row + 2 * n_columns, to.dz + p * F);
-      }
+      for (int64_t p = 0; p < n; ++p)
+        copy_entry<F>(grad_features + (b + p) * n_columns + level * F, to.value + p * F);
     };
     scatter_level<F>(args, level, load, grad_table);
   });
@@ -221,7 +214,7 @@ void hash_scatter_along(const HashEncodeArgs<T>& args, int level, const LevelPla
 
 #define SPLITNERF_INSTANTIATE(T)                                                        \
   template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);     \
-  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, const T*, T*); \
+  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, T*);           \
   template void hash_scatter_along<T>(const HashEncodeArgs<T>&, int, const LevelPlanes<const T>&, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -10,7 +10,7 @@
 namespace splitnerf::SPLITNERF_ISA {
 
 template <class T> void hash_encode(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);
-template <class T> void hash_scatter(const HashEncodeArgs<T>&, int, const T*, const T*, T*);
+template <class T> void hash_scatter(const HashEncodeArgs<T>&, int, const T*, T*);
 template <class T> void hash_scatter_along(const HashEncodeArgs<T>&, int, const LevelPlanes<const T>&, const T*, T*);
 template <class T> void sdf_values(const SdfNetwork<T>&, int64_t, const T*, T*, T*);
 template <class T> void sdf_layer(const SdfLayer<T>&, const SdfPoints<T>&, T*, T*, T*);
@@ -18,9 +18,6 @@ template <class T>
 void sdf_layer_backward(const SdfLayer<T>&, const SdfPoints<T>&, const SdfOutputs<const T>&, T*, const LevelPlanes<T>&,
                         const SdfLayerGrad<T>&);
 template <class T> void pair_likeness(int64_t, int64_t, const T*, int64_t, T*, T*);
-template <class T> void material_network(const MaterialNetwork<T>&, int64_t, const T*, T*, T*);
-template <class T>
-void material_network_backward(const MaterialNetwork<T>&, int64_t, const T*, const T*, T*, T*, T*);
 template <class T> void lobe_gather(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
 template <class T> void lobe_scatter(const LobeSide<T>&, const LobeSide<T>&, int64_t, int64_t, T*);
 template <class T> void visibility_horizon(const LobeSide<T>&, const T*, T*, uint32_t*);

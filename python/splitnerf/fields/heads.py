@@ -7,18 +7,6 @@ import math
 import torch
 from torch import Tensor, nn
 
-from splitnerf.ops import material_network
-
-FUSED_WIDTH = 128  # units of a layer up to which a GPU runs the network as one operator
-
-
-def is_fused(features: Tensor, width: int) -> bool:
-    """Whether a network of this width runs as one operator: on a GPU, where launches count, and where the layers are narrow.
-
-    On the CPU torch's own layers take .8 of the operator's time forward and backward, which works the hidden values out twice.
-    """
-    return features.is_cuda and width <= FUSED_WIDTH
-
 
 def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Sequential:
     """``n_layers`` hidden ReLU layers of ``width`` units and a linear output that starts near 0."""
@@ -55,8 +43,5 @@ class MaterialHead(nn.Module):
 
     def forward(self, *features: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """features [n, columns], n_inputs columns together -> albedo [n, 3], roughness [n, 1], metallic [n, 1]."""
-        layers = self.net[::2]
-        if is_fused(features[0], layers[0].out_features):
-            return material_network(features, [x.weight for x in layers], [x.bias for x in layers], self.min_roughness)
         albedo, roughness, metallic = torch.sigmoid(self.net(torch.cat(features, 1))).split([3, 1, 1], dim=1)
         return albedo, self.min_roughness + (1.0 - self.min_roughness) * roughness, metallic

@@ -30,9 +30,8 @@ from splitnerf.ops import (
     VisibilityCache,
     cached_occlusion,
     cached_visibility,
-    query_direction,
+    light_queries,
     sparse_product,
-    take_rows,
 )
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
@@ -230,7 +229,8 @@ class VisibilityBits(OcclusionModel):
         parts = []
         for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in self.emitters)):
             here, views = [part[vertices] for part in at_vertices], -self.directions[directions]
-            sky = light(query_direction(n[vertices], views, here[1]), (here[1] ** 4 + blur).sqrt().sqrt())
+            lobes = light_queries(n[vertices], views, here[1])[0][: len(views)]
+            sky = light(lobes, (here[1] ** 4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]
             specular = torch.where(mirrored[:, None] < 0, sky, seen)
             parts.append(reflect(n[vertices], views, here, specular, diffuse[vertices]) * facing)
@@ -241,9 +241,10 @@ class VisibilityBits(OcclusionModel):
     def answer(self, query: OcclusionQuery, segments: RaySegments | None) -> Occlusion:
         """The factors at points. With segments, all points of one have the factors of its representative."""
         if segments is not None:
-            answers = self.answer(OcclusionQuery((), *take_rows(list(query[1:]), segments.representatives)), None)
+            chosen = (x.index_select(0, segments.representatives) for x in query[1:])
+            answers = self.answer(OcclusionQuery((), *chosen), None)
             known = [part for part in answers if part is not None]
-            return Occlusion(*take_rows(known, segments.segment))
+            return Occlusion(*(part.index_select(0, segments.segment) for part in known))
         o_d, o_s, i_d, i_s = cached_occlusion(
             self.cache, query.positions, query.normals, query.lobe_dirs, query.roughness, self.light, self.radiance
         )

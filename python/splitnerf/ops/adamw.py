@@ -14,11 +14,8 @@ from splitnerf.ops._library import lib
 from splitnerf.ops.hash_grid import TableCopy
 
 
-def adamw_step_(
-    param: Tensor, grad: Tensor, exp_avg: Tensor, exp_avg_sq: Tensor, *, lr: float, beta1: float, beta2: float, eps: float,
-    weight_decay: float, step: int, sparse: bool = False, copy: Tensor | None = None,
-) -> None:  # fmt: skip
-    r"""One step of AdamW, written to param, exp_avg and exp_avg_sq.
+class AdamW(torch.optim.Optimizer):
+    r"""torch.optim.AdamW, all parameters of one dtype in one call; each class loads the other's state_dict.
 
     .. math::
 
@@ -31,35 +28,13 @@ def adamw_step_(
     in v.
 
     Args:
-        param: The parameter p, any shape, float32 or float64, contiguous.
-        grad: The gradient g, with param's shape and dtype.
-        exp_avg, exp_avg_sq: The moments m and v, with param's shape and dtype, contiguous; 0 before the first step.
+        params: Contiguous tensors, float32 or float64, or groups of them with their own settings.
         lr: The learning rate, at least 0.
-        beta1, beta2: The decay rates of the moments, in [0, 1).
+        betas: The decay rates of the moments, in [0, 1).
         eps: The stabiliser of the division, at least 0.
         weight_decay: The decoupled weight decay, at least 0.
-        step: The number of steps with this one, at least 1.
-        sparse: Whether to skip rows (of the last dimension) whose gradients are all exactly 0: param and both moments
-            do not change there.
-        copy: A rounded copy of param in float16 or bfloat16, contiguous, that the step also writes; it is rounded as by
-            the grid's own copy is.
-
-    Raises:
-        ValueError: A shape, dtype or number does not fit; the message names it.
-    """
-    lib.adamw_step_(
-        param, grad, exp_avg, exp_avg_sq, lr, beta1, beta2, eps, weight_decay, step, sparse, copy
-    )  # fmt: skip
-    torch.autograd.graph.increment_version([t for t in (param, exp_avg, exp_avg_sq, copy) if t is not None])
-
-
-class AdamW(torch.optim.Optimizer):
-    """torch.optim.AdamW by the rule of :func:`adamw_step_`, all parameters of one dtype in one call; each class loads the
-    other's state_dict.
-
-    Args:
-        params: Contiguous tensors, or groups of them with their own settings.
-        lr, betas, eps, weight_decay, sparse: The arguments of :func:`adamw_step_` with these names.
+        sparse: Whether to skip rows (of the last dimension) whose gradients are all exactly 0: the parameter and both
+            moments do not change there.
         copies: Rounded copies that a step also writes, by parameter: ``{grid.table: grid.copy}`` of a
             :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy itself.
 
@@ -173,5 +148,4 @@ class AdamW(torch.optim.Optimizer):
         return state
 
 
-torch.library.register_fake("splitnerf::adamw_step_", lambda *arguments: None)
 torch.library.register_fake("splitnerf::adamw_steps_", lambda *arguments: None)

@@ -1,20 +1,10 @@
-"""Multiresolution hash grid encoding, with the Jacobian as an output.
+"""Multiresolution hash grid encoding.
 
-Defined gradients (any other raises RuntimeError):
-
-========================  ========  ============  ============  =====================
-function                  to table  to positions  second order  note
-========================  ========  ============  ============  =====================
-``hash_encode``           yes       yes           yes, both     through the Jacobian
-``hash_encode_jacobian``  yes       yes           no            features and Jacobian
-========================  ========  ============  ============  =====================
+``hash_encode`` is differentiable once in positions and table; :func:`splitnerf.ops.sdf_field` has the gradient by the position as
+a result, so that a loss on it needs no second derivative.
 
 The operators can read a 16-bit copy (``stored``) of a float32 table: lookups gather half the memory, all computation is
 in float32, and the table itself gets its gradient in float32. docs/ops.md lists the errors.
-
-With the Jacobian as an output, an SDF normal is a product of two tensors, and a loss on it needs one
-backward pass instead of two.
-Measured on two cores, 12 levels x 2, 2^17 entries: 3.1 times as fast at 10k and at 100k points.
 
 Source: Mueller et al. 2022, section 3.
 """
@@ -96,7 +86,7 @@ def hash_encode(
             float32; or None.
 
     Returns:
-        [n, spec.n_outputs] features in the dtype of positions. Differentiable twice in positions and table. The
+        [n, spec.n_outputs] features in the dtype of positions. Differentiable once in positions and table. The
         gradient of table has the table's dtype and is summed in it; with `stored` the rounding counts as the identity.
 
     Raises:
@@ -104,22 +94,6 @@ def hash_encode(
         RuntimeError: `stored` or a 16-bit table requires a gradient; raised in the backward pass.
     """
     return lib.hash_encode(positions, table, *spec.arguments(spec.n_levels if n_active is None else n_active), stored)
-
-
-def hash_encode_jacobian(
-    positions: Tensor, table: Tensor, spec: HashGridSpec, n_active: int | None = None, stored: Tensor | None = None
-) -> tuple[Tensor, Tensor]:
-    """Encodes points and computes the features' derivatives in the same pass over the table.
-
-    For arguments and errors see :func:`hash_encode`.
-
-    Returns:
-        features [n, C] and jacobian [n, 3, C], ``jacobian[i, a, c] = d features[i, c] / d positions[i, a]``,
-        C = spec.n_outputs. Differentiable once in positions and table.
-    """
-    return lib.hash_encode_jacobian(
-        positions, table, *spec.arguments(spec.n_levels if n_active is None else n_active), stored
-    )
 
 
 def rounded(table: Tensor, dtype: torch.dtype) -> Tensor:
@@ -217,17 +191,10 @@ class HashGrid(nn.Module):
         """Features [n, C] of positions [n, 3] in the unit cube; see :func:`hash_encode`."""
         return hash_encode(positions, self.table, self.spec, self.n_active, self.stored())
 
-    def jacobian(self, positions: Tensor) -> tuple[Tensor, Tensor]:
-        """Features [n, C] and their Jacobian [n, 3, C]."""
-        return hash_encode_jacobian(positions, self.table, self.spec, self.n_active, self.stored())
-
 
 def _table_rows(grid: tuple) -> int:
     n_levels, base_resolution, growth, log2_table_size, *_ = grid
     return HashGridSpec(n_levels, 1, base_resolution, growth, log2_table_size).n_entries
-
-
-_NO_GRID = (None,) * 5
 
 
 def _keep_encoded(ctx, inputs, output):
@@ -235,11 +202,6 @@ def _keep_encoded(ctx, inputs, output):
     positions, table, *grid, stored = inputs
     ctx.save_for_backward(positions, table, *([] if stored is None else [stored]))
     ctx.grid = grid
-
-
-def _keep_scattered(ctx, inputs, output):
-    positions, grad_features, *ctx.grid = inputs
-    ctx.save_for_backward(positions, grad_features)
 
 
 def refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor], place: int = 7) -> None:
@@ -260,37 +222,10 @@ def _encode_backward(ctx, grad):
     refuse_rounded_gradients(ctx, "hash_encode", table, stored)
     grad_positions = grad_table = None
     if ctx.needs_input_grad[0]:
-        _, jacobian = lib.hash_encode_jacobian(positions, table, *ctx.grid, *(stored or [None]))
-        grad_positions = torch.einsum("nac,nc->na", jacobian, grad)
+        grad_positions = lib.hash_encode_backward_positions(positions, *(stored or [table]), grad, *ctx.grid)
     if ctx.needs_input_grad[1]:
         grad_table = lib.hash_encode_backward(positions, grad, *ctx.grid)
-    return grad_positions, grad_table, *_NO_GRID, None
-
-
-def _scatter_backward(ctx, grad_grad_table):
-    """The gradients of grad_table = sum_p w(p) grad_features(p): it is linear, so its adjoint encodes
-    grad_grad_table."""
-    positions, grad_features = ctx.saved_tensors
-    grad_positions = grad_grad_features = None
-    if ctx.needs_input_grad[0]:
-        _, jacobian = lib.hash_encode_jacobian(positions, grad_grad_table, *ctx.grid, None)
-        grad_positions = torch.einsum("nac,nc->na", jacobian, grad_features)
-    if ctx.needs_input_grad[1]:
-        grad_grad_features = lib.hash_encode(positions, grad_grad_table, *ctx.grid, None)
-    return grad_positions, grad_grad_features, *_NO_GRID
-
-
-def _jacobian_backward(ctx, grad_features, grad_jacobian):
-    positions, table, *stored = ctx.saved_tensors
-    refuse_rounded_gradients(ctx, "hash_encode_jacobian", table, stored)
-    grad_positions = grad_table = None
-    if ctx.needs_input_grad[0]:
-        grad_positions = lib.hash_encode_jacobian_backward_positions(
-            positions, *(stored or [table]), grad_features, grad_jacobian, *ctx.grid
-        )
-    if ctx.needs_input_grad[1]:
-        grad_table = lib.hash_encode_jacobian_backward(positions, grad_features, grad_jacobian, *ctx.grid)
-    return grad_positions, grad_table, *_NO_GRID, None
+    return grad_positions, grad_table, *(None,) * 6
 
 
 register(
@@ -302,25 +237,10 @@ register(
 register(
     "hash_encode_backward",
     fake=lambda positions, grad, *grid: grad.new_empty(_table_rows(grid), grad.shape[1] // grid[0]),
-    setup_context=_keep_scattered,
-    backward=_scatter_backward,
 )
 register(
-    "hash_encode_jacobian",
-    fake=lambda positions, table, *grid: (
-        positions.new_empty(positions.shape[0], grid[0] * table.shape[1]),
-        positions.new_empty(positions.shape[0], 3, grid[0] * table.shape[1]),
-    ),
-    setup_context=_keep_encoded,
-    backward=_jacobian_backward,
-)
-register(
-    "hash_encode_jacobian_backward",
-    fake=lambda positions, grad, grad_jacobian, *grid: grad.new_empty(_table_rows(grid), grad.shape[1] // grid[0]),
-)
-register(
-    "hash_encode_jacobian_backward_positions",
-    fake=lambda positions, table, grad_features, grad_jacobian, *grid: positions.new_empty(positions.shape),
+    "hash_encode_backward_positions",
+    fake=lambda positions, *rest: positions.new_empty(positions.shape),
 )
 
 

@@ -9,23 +9,6 @@ from torch import Tensor
 from splitnerf.ops._library import lib, register
 
 
-def log_chroma(radiance: Tensor) -> Tensor:
-    """How coloured radiance is: the mean squared distance of its log channels from their mean, ``l = ln(L + 1e-6)``.
-
-    Args:
-        radiance: [n, 3] linear, at least 0, float32 or float64.
-
-    Returns:
-        [] the mean over points and channels; 0 without points, and for grey of any brightness. Differentiable in radiance.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
-
-    Source: our own.
-    """
-    return lib.log_chroma(radiance)
-
-
 def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
     r"""How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
 
@@ -52,14 +35,6 @@ def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
     return lib.light_prior(texels, list(level_sizes))
 
 
-def _keep_radiance(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
-
-
-def _chroma_backward(ctx, grad):
-    return lib.log_chroma_backward(*ctx.saved_tensors, grad)
-
-
 def _keep_texels(ctx, inputs, output):
     texels, ctx.level_sizes = inputs
     ctx.save_for_backward(texels)
@@ -69,13 +44,6 @@ def _prior_backward(ctx, grad):
     return lib.light_prior_backward(*ctx.saved_tensors, ctx.level_sizes, grad), None
 
 
-register(
-    "log_chroma",
-    fake=lambda radiance: radiance.new_empty(()),
-    setup_context=_keep_radiance,
-    backward=_chroma_backward,
-)
-register("log_chroma_backward", fake=lambda radiance, grad_loss: radiance.new_empty(radiance.shape))
 register(
     "light_prior",
     fake=lambda texels, level_sizes: texels.new_empty(()),

@@ -6,6 +6,7 @@ All are differentiable once, in the arguments that the docstrings name; a gradie
 from __future__ import annotations
 
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
 from splitnerf.ops._library import lib, refuse_gradients, register
 
@@ -69,30 +70,6 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tenso
     return lib.gradient_losses(gradients, weights, beside)[0]
 
 
-def material_losses(
-    albedo: Tensor, metallic: Tensor, shares: Tensor, *, smooth_l1: bool = False
-) -> Tensor:
-    """Three penalties on metallic m: for metals, for values between 0 and 1, and for dark metals.
-
-    Args:
-        albedo: [n, 3] linear albedo in [0, 1]; no gradient.
-        metallic: [n, 1] metallic m in [0, 1].
-        shares: [n] weights of the points.
-        smooth_l1: Whether the first penalty is m^2 / 2, the smooth L1 loss, instead of m^2.
-
-    Returns:
-        [3]: metal, binary_metal and dark_metal, weighted means of m^2, of m (1 - m) and of m (1 - F0 / .4)+, where
-        F0 is the brightest channel of the albedo; 0 without points. Differentiable in metallic.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
-
-    Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = .04
-    look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
-    """
-    return lib.material_losses(albedo, metallic, shares, smooth_l1)[0]
-
-
 def quadratic_entropy(x: Tensor) -> Tensor:
     r"""The entropy of points, over all n^2 pairs of them, i = j included.
 
@@ -123,24 +100,15 @@ def _pixel_backward(ctx, grad):
 
 
 def _keep_inputs_and_total(ctx, inputs, output):
-    """Saves the tensors among the inputs, and the sum of weights, to which there is no gradient."""
-    tensors = [x for x in inputs if isinstance(x, Tensor)]
-    ctx.numbers = inputs[len(tensors) :]
+    """Saves the inputs and the sum of weights, to which there is no gradient."""
     ctx.mark_non_differentiable(output[1])
     ctx.set_materialize_grads(False)  # else zeros are made for it
-    ctx.save_for_backward(*tensors, output[1])
+    ctx.save_for_backward(*inputs, output[1])
 
 
 def _gradient_backward(ctx, grad, _):
     refuse_gradients(ctx, "gradient_losses", weights=1)
     return None if grad is None else lib.gradient_losses_backward(*ctx.saved_tensors, grad), None, None
-
-
-def _material_backward(ctx, grad, _):
-    refuse_gradients(ctx, "material_losses", albedo=0, shares=2)
-    *tensors, total = ctx.saved_tensors
-    by_metallic = None if grad is None else lib.material_losses_backward(*tensors, *ctx.numbers, total, grad)
-    return None, by_metallic, None, None
 
 
 def _keep_gradient(ctx, inputs, output):
@@ -149,6 +117,7 @@ def _keep_gradient(ctx, inputs, output):
     ctx.save_for_backward(output[1])
 
 
+@once_differentiable
 def _entropy_backward(ctx, grad, _):
     return None if grad is None else ctx.saved_tensors[0] * grad
 
@@ -170,13 +139,6 @@ register(
     backward=_gradient_backward,
 )
 register("gradient_losses_backward", fake=lambda gradients, *rest: gradients.new_empty(gradients.shape))
-register(
-    "material_losses",
-    fake=lambda albedo, metallic, *rest: (metallic.new_empty(3), metallic.new_empty(())),
-    setup_context=_keep_inputs_and_total,
-    backward=_material_backward,
-)
-register("material_losses_backward", fake=lambda albedo, metallic, *rest: metallic.new_empty(metallic.shape))
 register(
     "quadratic_entropy",
     fake=lambda x: (x.new_empty(()), x.new_empty(x.shape)),

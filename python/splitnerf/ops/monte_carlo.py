@@ -1,4 +1,4 @@
-"""Monte Carlo shading: directions from the BSDF, sums over their incoming light, and the reflected radiance.
+"""Shading by sums over directions: the incoming light under the lobes of points, and the reflected radiance.
 
 ``monte_carlo_light`` is differentiable once in normals, roughness and radiance, ``shade_sums`` once in all; a gradient
 to the rest raises. ``shade_sums`` is the path tracer's BSDF under the light: a metal with Schlick's Fresnel term and a
@@ -35,52 +35,6 @@ class LightSums(NamedTuple):
     dielectric: Tensor
 
 
-def specular_share(normals: Tensor, view_dirs: Tensor, albedo: Tensor, roughness: Tensor, metallic: Tensor) -> Tensor:
-    """The share of directions that :func:`sample_bsdf` should draw from the visible normals. No gradient.
-
-    It is the share of the specular lobe's single scattering in what the material reflects of uniform light, as the path
-    tracer samples, between .1 and .95, so that neither lobe is without directions.
-
-    Args:
-        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
-        albedo: [n, 3] linear, in [0, 1].
-        roughness, metallic: [n, 1], in [0, 1].
-
-    Returns:
-        [n, 1] shares.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
-    """
-    return lib.specular_share(normals, view_dirs, albedo, roughness, metallic, brdf_lut(normals.device))
-
-
-def sample_bsdf(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, specular_share: Tensor, n_samples: int, seed: int = 0
-) -> tuple[Tensor, Tensor]:
-    """Samples light directions for points: a share of them by the visible normals, the rest by the cosine. No gradient.
-
-    Args:
-        normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
-        roughness: [n, 1] perceptual roughness in [0, 1]; lobes below ggx_alpha = .002 are sampled with that width.
-        specular_share: [n, 1] share of the visible normals, in [0, 1], from :func:`specular_share`. With 0 or 1 a lobe
-            has no directions; what only that lobe can reach is then missing.
-        n_samples: The number of directions per point; those of either lobe form a lattice with a random shift for each
-            point. The number of the visible normals' is share times n_samples, rounded up or down at random.
-        seed: The seed of the shifts and roundings.
-
-    Returns:
-        directions [n, n_samples, 3] unit, those of the visible normals first, and the density of the mixture of both
-        lobes [n, n_samples], sr^-1; 0 for a direction below the horizon.
-
-    Raises:
-        ValueError: A shape, dtype or count does not fit.
-
-    Source: Heitz 2018 (visible normals); Veach 1997 (balance heuristic).
-    """
-    return lib.sample_bsdf(normals, view_dirs, roughness, specular_share, n_samples, seed)
-
-
 def monte_carlo_light(
     normals: Tensor, view_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, pdf: Tensor, radiance: Tensor
 ) -> LightSums:
@@ -89,7 +43,7 @@ def monte_carlo_light(
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         roughness: [n, 1] perceptual roughness in [0, 1].
-        light_dirs, pdf: [n, k, 3] directions and [n, k] densities from :func:`sample_bsdf`; no gradient.
+        light_dirs, pdf: [n, k, 3] unit directions and [n, k] densities with which they were drawn, sr^-1; no gradient.
         radiance: [n, k, 3] incoming radiance from the directions, 0 where the ray is blocked.
 
     Returns:
@@ -190,10 +144,8 @@ def summed_correction(
 
     Source: SplitNeRF Eq. (4)-(6), by quadrature.
     """
-    nothing = normals.new_empty(0, len(directions), 3)
-    (sums,), (normals, roughness) = lib.summed_light.handing_on(
-        normals, view_dirs, roughness, directions, solid_angles, radiance, visible, nothing if sent is None else sent
-    )
+    sent = normals.new_empty(0, len(directions), 3) if sent is None else sent
+    sums = lib.summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent)
     table = brdf_lut(normals.device)
     return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, table, compensate, split, share)
 
@@ -208,9 +160,9 @@ def _backward(ctx, grad_sums):
     return normals, None, roughness, None, None, radiance
 
 
-def _shared_backward(ctx, grad_sums, more=(None, None)):
+def _shared_backward(ctx, grad_sums):
     refuse_gradients(ctx, "summed_light", view_dirs=1, directions=3, solid_angles=4, visible=6, sent=7)
-    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums, *more)
+    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums)
     return normals, None, roughness, None, None, radiance, None, None
 
 
@@ -226,17 +178,6 @@ def _summed_backward(ctx, grad):
     return *grads, None, None, None if other is None else grad_other, None
 
 
-register(
-    "specular_share",
-    fake=lambda normals, view_dirs, albedo, roughness, *rest: roughness.new_empty(roughness.shape),
-)
-register(
-    "sample_bsdf",
-    fake=lambda normals, view_dirs, roughness, specular_share, n_samples, seed: (
-        normals.new_empty(normals.shape[0], n_samples, 3),
-        normals.new_empty(normals.shape[0], n_samples),
-    ),
-)
 register(
     "monte_carlo_light",
     fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
@@ -256,7 +197,6 @@ register(
     fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
     setup_context=_keep,
     backward=_shared_backward,
-    hands_on=(0, 2),
 )
 register(
     "summed_light_backward",

@@ -1,9 +1,9 @@
-"""Visibility and occlusion factors by tracing a triangle mesh.
+"""A triangle mesh that rays are traced in, and the occlusion factors of points.
 
 The mesh is traced on the CPU. Tensors on another device are copied to the CPU, and the results are copied back; the
 caller waits for both copies.
 
-Neither operator has a gradient, since its outputs are targets of the training; a backward pass raises.
+The operator has no gradient, since its outputs are targets of the training; a backward pass raises.
 """
 
 from __future__ import annotations
@@ -51,24 +51,22 @@ class MeshScene:
         """
         return self._scene.trace_closest(origins, directions)[1:]
 
+    def is_open(self, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
+        """Whether each ray meets no triangle.
 
-def trace_visibility(scene: MeshScene, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
-    """Whether each ray meets no triangle.
+        Args:
+            origins, directions: [n, 3] float32 on the CPU. Neighbours in the arrays should be neighbours in space, since
+                rays are traced in packets of 16.
+            t_far: The length of the rays in multiples of ``directions``.
 
-    Args:
-        scene: The mesh.
-        origins, directions: [n, 3] float32, origins in scene units. Neighbours in the arrays should be neighbours in
-            space, since rays are traced in packets of 16.
-        t_far: The length of the rays in multiples of ``directions``.
+        Returns:
+            [n] bool, True where the ray is open.
 
-    Returns:
-        [n] bool, True where the ray is open.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
-        IndexError: The scene no longer exists.
-    """
-    return lib.trace_visibility(scene.handle, origins.cpu(), directions.cpu(), t_far).to(origins.device)
+        Raises:
+            ValueError: A shape or dtype does not fit.
+        """
+        rays = (x.contiguous().numpy() for x in (origins, directions))
+        return torch.from_numpy(self._scene.trace_visibility(*rays, t_far))
 
 
 def occlusion_factors(
@@ -97,7 +95,7 @@ def occlusion_factors(
     Args:
         scene: The mesh.
         positions, normals: [n, 3] positions (scene units) and unit normals.
-        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.light_queries`).
         roughness: [n, 1] perceptual roughness in [0, 1].
         environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
         n_diffuse_rays, n_specular_rays: The numbers of rays per point.
@@ -125,10 +123,6 @@ def occlusion_factors(
     return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
 
 
-register(
-    "trace_visibility",
-    fake=lambda scene, origins, directions, t_far: origins.new_empty(origins.shape[0], dtype=torch.bool),
-)
 register(
     "occlusion_factors",
     fake=lambda scene, positions, *rest: (

@@ -1,5 +1,4 @@
-"""Where a training step looks: rays through drawn pixels, what photos show there, and points of the rays' samples. None has a
-gradient."""
+"""Rays through drawn pixels, and what photos show there. Neither operator has a gradient."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib, register
-from splitnerf.ops.rays import PackedSamples
 
 
 class PixelList(NamedTuple):
@@ -107,53 +105,6 @@ def read_pixels(
     return lib.read_pixels(codes, index, view, exposures, backgrounds, *edges)
 
 
-def probe_points(random: Tensor, n_anywhere: int, box: float, deviation: float) -> tuple[Tensor, Tensor]:
-    """Points of a cube and normal vectors, from uniform numbers.
-
-    Args:
-        random: [3 k + 4 m] in [0, 1), float32 or float64: three numbers for each point, then four for each vector.
-        n_anywhere: The number k of points.
-        box: Half the edge of the cube, scene units.
-        deviation: The standard deviation of each coordinate of a vector, scene units. In float32 no coordinate is more than 5.8
-            deviations from 0.
-
-    Returns:
-        anywhere: [k, 3] points, even over [-box, box)^3.
-        shifts: [m, 3] vectors.
-
-    Raises:
-        ValueError: The dtype does not fit, or the numbers are not that many.
-
-    Source: Box and Muller 1958.
-    """
-    return lib.probe_points(random, n_anywhere, box, deviation)
-
-
-def place_samples(
-    rays_o: Tensor, rays_d: Tensor, samples: PackedSamples, anywhere: Tensor, chosen: Tensor, shifts: Tensor, room: int = 0
-) -> tuple[Tensor, Tensor, Tensor]:
-    """The points at which a step evaluates the field: the midpoints of samples, given points, and points beside samples.
-
-    Args:
-        rays_o, rays_d: [n_rays, 3] origins and unit directions.
-        samples: n samples of the rays, which fill their first rows; what is behind them counts for nothing.
-        anywhere: [k, 3] points.
-        chosen: [m] in [0, 1): number floor(n chosen) of n is the sample that a point stands beside.
-        shifts: [m, 3] from that sample to the point.
-        room: The least number of rows for samples. The first samples are repeated until the rows are full; without samples
-            they are zeros.
-
-    Returns:
-        positions: [max(rows, room) + k + m, 3] in that order; without a row for samples m is 0.
-        directions: [max(rows, room), 3] unit, the directions of the samples' rays; 0 behind the samples.
-        beside: [m] int64, the chosen samples.
-
-    Raises:
-        ValueError: A shape or dtype does not fit, or (on the CPU) a sample's ray is not there.
-    """
-    return lib.place_samples(rays_o, rays_d, *samples, anywhere, chosen, shifts, room)
-
-
 def _fake_draw(random, n_near, *rest):
     n = random.shape[0]
     return (*(random.new_empty(n, 3) for _ in range(2)), *(random.new_empty(n, dtype=torch.int64) for _ in range(2)))
@@ -165,18 +116,5 @@ def _fake_read(codes, index, view, exposures, backgrounds, *edges):
     return *found, backgrounds.new_empty(n, dtype=torch.bool)
 
 
-def _fake_probes(random, n_anywhere, box, deviation):
-    return random.new_empty(n_anywhere, 3), random.new_empty((random.shape[0] - 3 * n_anywhere) // 4, 3)
-
-
-def _fake_place(rays_o, rays_d, ray_indices, t_starts, t_ends, offsets, anywhere, chosen, shifts, room):
-    n, beside = ray_indices.shape[0], chosen.shape[0] if ray_indices.shape[0] else 0
-    n_room = max(n, room)
-    positions = rays_o.new_empty(n_room + anywhere.shape[0] + beside, 3)
-    return positions, rays_o.new_empty(n_room, 3), rays_o.new_empty(beside, dtype=torch.int64)
-
-
 register("draw_rays", fake=_fake_draw)
 register("read_pixels", fake=_fake_read)
-register("probe_points", fake=_fake_probes)
-register("place_samples", fake=_fake_place)

@@ -2,8 +2,7 @@
 
 The samples of all rays are in one array, ray after ray; ``offsets`` [n_rays + 1] holds the first sample of each ray.
 
-Differentiable once: ``neus_weights`` in f_prev, f_next and s, ``surface_weights`` in sdf, gradient and s, ``sharpness`` in
-variance, ``composite`` in weights, values and opacity, ``ShadingSubset.interpolate`` in values. A second derivative raises.
+Differentiable once: ``surface_weights`` in sdf, gradient and s, ``composite`` in weights, values and opacity, ``ShadingSubset.interpolate`` in values. A second derivative raises.
 ``march_rays`` and ``spread_samples`` have no gradient.
 """
 
@@ -68,36 +67,6 @@ def march_rays(
     return PackedSamples(*lib.march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples))
 
 
-def neus_weights(
-    f_prev: Tensor, f_next: Tensor, s: Tensor, offsets: Tensor, min_transmittance: float = 0.0
-) -> tuple[Tensor, Tensor]:
-    r"""Rendering weights of an SDF's samples, in log space.
-
-    With :math:`\Phi(f) = 1 / (1 + e^{-s f})` the opacity of a sample is
-
-    .. math:: \alpha = \max\left(0, \frac{\Phi(f_{prev}) - \Phi(f_{next})}{\Phi(f_{prev})}\right) .
-
-    It is computed as the optical depth :math:`\tau = \ln(1 + (e^d - 1) \Phi(-f_{prev}))`,
-    :math:`d = s \max(0, f_{prev} - f_{next})`; the transmittance is :math:`e^{-\sum \tau}`.
-
-    Args:
-        f_prev, f_next: [n] signed distances at the start and the end of each sample, scene units.
-        s: [] sharpness of the density, positive.
-        offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
-        min_transmittance: The transmittance below which samples get weight 0, in [0, 1); it also bounds the error of a
-            pixel.
-
-    Returns:
-        weights [n] and opacity [n_rays], the sum of a ray's weights.
-
-    Raises:
-        ValueError: A shape, dtype or the order of the offsets does not fit.
-
-    Source: NeuS Eq. (13); SplitNeRF Eq. (1)-(2).
-    """
-    return lib.neus_weights(f_prev, f_next, s, offsets, min_transmittance)
-
-
 def surface_weights(
     sdf: Tensor,
     gradient: Tensor,
@@ -109,8 +78,7 @@ def surface_weights(
     anneal: float | Tensor = 1.0,
     min_transmittance: float = 0.0,
     n_samples: int | None = None,
-    hand_on: bool = False,
-) -> tuple[Tensor, ...]:
+) -> tuple[Tensor, Tensor, Tensor]:
     r"""Normals and rendering weights of samples, from the distance and its gradient at the samples' midpoints.
 
     With :math:`n = \nabla f / |\nabla f|` and the ray's direction d, both ends are estimated from the middle:
@@ -120,7 +88,13 @@ def surface_weights(
        f_{prev}, f_{next} &= f \mp \tfrac{1}{2}\, c(d \cdot n)\, step \\
        c(x) &= -\left[(1 - anneal) \max(0, \tfrac{1}{2} - \tfrac{x}{2}) + anneal\, \max(0, -x)\right]
 
-    The weights are :func:`neus_weights` of these ends. A field gradient shorter than .001 gets no gradient in the backward pass.
+    With :math:`\Phi(f) = 1 / (1 + e^{-s f})` the opacity of a sample is
+
+    .. math:: \alpha = \max\left(0, \frac{\Phi(f_{prev}) - \Phi(f_{next})}{\Phi(f_{prev})}\right) .
+
+    It is computed in log space, as the optical depth :math:`\tau = \ln(1 + (e^a - 1) \Phi(-f_{prev}))`,
+    :math:`a = s \max(0, f_{prev} - f_{next})`; the transmittance is :math:`e^{-\sum \tau}`. A field gradient shorter than .001 gets
+    no gradient in the backward pass.
 
     Args:
         sdf, gradient: [n] signed distances (scene units), or [n, c] with the distances in the first column, and their gradients
@@ -130,13 +104,11 @@ def surface_weights(
         offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
         step: The length of a sample, scene units; a number or a tensor [].
         anneal: The annealing of the cosine: 0 at the start of a training, 1 when done; a number or a tensor [].
-        min_transmittance: The transmittance below which samples get weight 0, see :func:`neus_weights`.
+        min_transmittance: The transmittance below which samples get weight 0, in [0, 1); it also bounds the error of a pixel.
         n_samples: Only so many of the first points are samples, as if the others were not there; None: all.
-        hand_on: Whether sdf and gradient are returned as well, for who reads them next: the gradients that come back are added
-            to this operator's own, without a launch of their own.
 
     Returns:
-        normals [n_samples, 3], weights [n_samples] and opacity [n_rays], then what is handed on. Differentiable once in sdf,
+        normals [n_samples, 3], weights [n_samples] and opacity [n_rays]. Differentiable once in sdf,
         gradient and s.
 
     Raises:
@@ -144,31 +116,9 @@ def surface_weights(
 
     Source: NeuS Eq. (13) and its released code's estimate of both ends from one evaluation.
     """
-    arguments = (
-        sdf, gradient, rays_d, s, offsets, _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance,
-        -1 if n_samples is None else n_samples,
-    )  # fmt: skip
-    if not hand_on:
-        return lib.surface_weights(*arguments)
-    found, handed = lib.surface_weights.handing_on(*arguments)
-    return *found, *handed
-
-
-def sharpness(variance: Tensor) -> Tensor:
-    """The sharpness s = exp(10 v) of the NeuS density, where Phi(f) = sigmoid(s f); 10 v is clamped to [0, 9].
-
-    Args:
-        variance: v, any shape, float32 or float64.
-
-    Returns:
-        s in [1, e^9] of that shape, 1 / scene units. Differentiable once; the gradient is 0 where 10 v is clamped.
-
-    Raises:
-        ValueError: The dtype does not fit.
-
-    Source: NeuS (Wang et al. 2021), section 4.1, and its released code.
-    """
-    return lib.sharpness(variance)
+    n_samples = -1 if n_samples is None else n_samples
+    numbers = _as_tensor(step, sdf), _as_tensor(anneal, sdf), min_transmittance, n_samples
+    return lib.surface_weights(sdf, gradient, rays_d, s, offsets, *numbers)
 
 
 def _as_tensor(value: float | Tensor, like: Tensor) -> Tensor:
@@ -245,9 +195,8 @@ def spread_samples(
 
 
 def composite(
-    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4,
-    hand_on: bool = False,
-) -> Tensor | tuple[Tensor, Tensor]:  # fmt: skip
+    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4
+) -> Tensor:
     """Weighted sum of the samples' values along each ray or, with the rays' opacity o, their mean: sum / max(o, least).
 
     Args:
@@ -256,7 +205,6 @@ def composite(
         offsets: [n_rays + 1] int64, see :class:`PackedSamples`.
         opacity: [n_rays] what the sums are divided by; None: they are not.
         least_opacity: A smaller opacity counts as this one, and gets no gradient; positive.
-        hand_on: Whether the opacity is returned as well, see :func:`surface_weights`.
 
     Returns:
         [n_rays, c] sums or means; 0 for a ray without samples. Differentiable once in weights, values and opacity.
@@ -264,10 +212,7 @@ def composite(
     Raises:
         ValueError: A shape, dtype or the order of the offsets does not fit.
     """
-    if not hand_on:
-        return lib.composite(weights, values, offsets, opacity, least_opacity)
-    (sums,), (opacity,) = lib.composite.handing_on(weights, values, offsets, opacity, least_opacity)
-    return sums, opacity
+    return lib.composite(weights, values, offsets, opacity, least_opacity)
 
 
 def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
@@ -280,36 +225,15 @@ def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
     )
 
 
-def _keep_weights(ctx, inputs, output):
-    f_prev, f_next, s, offsets, ctx.min_transmittance = inputs
-    ctx.save_for_backward(f_prev, f_next, s, offsets, output[0])
-
-
-def _weights_backward(ctx, grad_weights, grad_opacity):
-    f_prev, f_next, s, offsets, weights = ctx.saved_tensors
-    grad_prev, grad_next, grad_s = lib.neus_weights_backward(
-        f_prev, f_next, s, offsets, ctx.min_transmittance, weights, grad_weights, grad_opacity
-    )
-    return grad_prev, grad_next, grad_s.sum(), None, None
-
-
 def _keep_composite(ctx, inputs, output):
     *tensors, ctx.least_opacity = inputs
     ctx.save_for_backward(*tensors)
 
 
-def _composite_backward(ctx, grad, more=(None,)):
+def _composite_backward(ctx, grad):
     *_, opacity = tensors = ctx.saved_tensors
-    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad, *more)
+    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad)
     return by_weights, by_values, None, None if opacity is None else by_opacity, None
-
-
-def _keep_variance(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
-
-
-def _sharpness_backward(ctx, grad):
-    return lib.sharpness_backward(*ctx.saved_tensors, grad)
 
 
 def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1, unit=None):
@@ -337,18 +261,11 @@ def _keep_surface(ctx, inputs, output):
     ctx.save_for_backward(*tensors, output[1])
 
 
-def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity, more=(None, None)):
+def _surface_backward(ctx, grad_normals, grad_weights, grad_opacity):
     refuse_gradients(ctx, "surface_weights", rays_d=2, step=5, anneal=6)
     *tensors, weights = ctx.saved_tensors
     grad_sdf, grad_gradient, grad_s = lib.surface_weights_backward(
-        *tensors,
-        ctx.min_transmittance,
-        ctx.n_samples,
-        weights,
-        grad_normals,
-        grad_weights,
-        grad_opacity,
-        *more,
+        *tensors, ctx.min_transmittance, ctx.n_samples, weights, grad_normals, grad_weights, grad_opacity
     )
     return grad_sdf, grad_gradient, None, grad_s.sum(), None, None, None, None, None
 
@@ -364,7 +281,6 @@ register(
     fake=_fake_surface,
     setup_context=_keep_surface,
     backward=_surface_backward,
-    hands_on=(0, 1),
 )
 register(
     "surface_weights_backward",
@@ -386,28 +302,10 @@ register(
     fake=lambda grad, first, second, share, shaded: grad.new_empty(shaded.shape[0], grad.shape[1]),
 )
 register(
-    "neus_weights",
-    fake=lambda f_prev, f_next, s, offsets, eps: (
-        f_prev.new_empty(f_prev.shape),
-        f_prev.new_empty(offsets.shape[0] - 1),
-    ),
-    setup_context=_keep_weights,
-    backward=_weights_backward,
-)
-register(
-    "neus_weights_backward",
-    fake=lambda f_prev, f_next, s, offsets, eps, weights, grad_weights, grad_opacity: (
-        f_prev.new_empty(f_prev.shape),
-        f_next.new_empty(f_next.shape),
-        grad_opacity.new_empty(grad_opacity.shape),
-    ),
-)
-register(
     "composite",
     fake=lambda weights, values, offsets, *rest: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
     setup_context=_keep_composite,
     backward=_composite_backward,
-    hands_on=(3,),
 )
 register(
     "composite_backward",
@@ -416,10 +314,3 @@ register(
         weights.new_empty(0 if opacity is None else opacity.shape[0]),
     ),
 )  # fmt: skip
-register(
-    "sharpness",
-    fake=lambda variance: variance.new_empty(variance.shape),
-    setup_context=_keep_variance,
-    backward=_sharpness_backward,
-)
-register("sharpness_backward", fake=lambda variance, grad_s: variance.new_empty(variance.shape))

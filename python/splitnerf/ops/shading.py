@@ -36,8 +36,12 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
     return _brdf_lut(torch.device(device))
 
 
-def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> Tensor:
-    r"""The direction at which the pre-integrated light is looked up for the specular lobe.
+def light_queries(
+    normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean"
+) -> tuple[Tensor, Tensor]:
+    r"""Where shading looks the pre-integrated light up, for the specular and for the diffuse light at once.
+
+    The specular lobe is looked up at
 
     .. math::
 
@@ -54,29 +58,8 @@ def query_direction(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query
         query: The kind of direction: ``mean`` (d above) or ``reflection`` (w_r, the paper's form).
 
     Returns:
-        [n, 3] unit directions.
-
-    Raises:
-        ValueError: A shape, dtype or the name of the query does not fit.
-    """
-    if query not in QUERIES:
-        raise ValueError(f"query_direction: query must be one of {QUERIES}, got {query!r}")
-    return lib.query_direction(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
-
-
-def light_queries(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean", hand_on: bool = False
-) -> tuple[Tensor, ...]:
-    """What shading asks the pre-integrated light, for the specular and for the diffuse light at once.
-
-    Args:
-        normals, view_dirs, roughness, query: See :func:`query_direction`.
-        hand_on: Whether normals and roughness are returned as well, see :func:`surface_weights`.
-
-    Returns:
-        directions [2 n, 3]: those of :func:`query_direction`, then the normals on the viewer's side.
+        directions [2 n, 3], unit: those of the lobes, then the normals on the viewer's side.
         roughness [2 n, 1]: the points' own, then 1.
-        What is handed on.
         Differentiable once in normals and roughness.
 
     Raises:
@@ -86,11 +69,7 @@ def light_queries(
     """
     if query not in QUERIES:
         raise ValueError(f"light_queries: query must be one of {QUERIES}, got {query!r}")
-    arguments = normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean"
-    if not hand_on:
-        return lib.light_queries(*arguments)
-    found, handed = lib.light_queries.handing_on(*arguments)
-    return *found, *handed
+    return lib.light_queries(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
 
 
 def split_sum_shade(
@@ -107,8 +86,7 @@ def split_sum_shade(
     compensate: bool = False,
     indirect_s: Tensor | None = None,
     indirect_d: Tensor | None = None,
-    hand_on: bool = False,
-) -> Tensor | tuple[Tensor, ...]:
+) -> Tensor:
     r"""Outgoing linear radiance of points under the pre-integrated light, in one pass.
 
     .. math::
@@ -123,7 +101,7 @@ def split_sum_shade(
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.
         albedo: [n, 3] linear, in [0, 1].
         roughness, metallic: [n, 1], in [0, 1].
-        specular: [n, 3] radiance g(d, rho); d from :func:`query_direction`. Or, with ``diffuse`` None, [2 n, 3]: what
+        specular: [n, 3] radiance g(d, rho); d from :func:`light_queries`. Or, with ``diffuse`` None, [2 n, 3]: what
             the light answers to :func:`light_queries`, g(d, rho) of all points and then g(n, 1) of all.
         diffuse: [n, 3] radiance g(n, 1), or None.
         occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
@@ -133,10 +111,9 @@ def split_sum_shade(
             the albedo of the metal and .04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
         indirect_s, indirect_d: [n, 3] light i_s and i_d >= 0 that the object itself sends to the points, in the
             normalisation of g, or None for none; no gradient.
-        hand_on: Whether normals, albedo, roughness and metallic are returned as well, see :func:`surface_weights`.
 
     Returns:
-        [n, 3] linear radiance, then what is handed on.
+        [n, 3] linear radiance.
 
     Raises:
         ValueError: A shape, dtype or mode does not fit.
@@ -145,14 +122,10 @@ def split_sum_shade(
     """
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
-    arguments = (
+    return lib.split_sum_shade(
         normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
         brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate, indirect_s, indirect_d,
     )  # fmt: skip
-    if not hand_on:
-        return lib.split_sum_shade(*arguments)
-    found, handed = lib.split_sum_shade.handing_on(*arguments)
-    return *found, *handed
 
 
 def _keep_query(ctx, inputs, output):
@@ -160,15 +133,9 @@ def _keep_query(ctx, inputs, output):
     ctx.mean = inputs[4]
 
 
-def _query_backward(ctx, grad):
-    refuse_gradients(ctx, "query_direction", lut=3)
-    grads = lib.query_direction_backward(*ctx.saved_tensors, ctx.mean, grad)
-    return *grads, None, None
-
-
-def _queries_backward(ctx, *grads, more=(None, None)):
+def _queries_backward(ctx, *grads):
     refuse_gradients(ctx, "light_queries", view_dirs=1, lut=3)
-    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads, *more)
+    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads)
     return grad_normals, None, grad_roughness, None, None
 
 
@@ -177,27 +144,15 @@ def _keep_shade(ctx, inputs, output):
     ctx.options = inputs[10:12]
 
 
-def _shade_backward(ctx, grad, more=(None, None, None, None)):
+def _shade_backward(ctx, grad):
     refuse_gradients(ctx, "split_sum_shade", lut=9, indirect_s=12, indirect_d=13)
     *points, indirect_s, indirect_d = ctx.saved_tensors
-    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad, *more))
+    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad))
     if points[6] is None:
         grads[6] = None
     return *grads, None, None, None, None, None
 
 
-register(
-    "query_direction",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape),
-    setup_context=_keep_query,
-    backward=_query_backward,
-)
-register(
-    "query_direction_backward",
-    fake=lambda normals, view_dirs, roughness, lut, mean, grad: tuple(
-        t.new_empty(t.shape) for t in (normals, view_dirs, roughness)
-    ),
-)
 register(
     "light_queries",
     fake=lambda normals, *rest: (
@@ -205,7 +160,6 @@ register(
     ),
     setup_context=_keep_query,
     backward=_queries_backward,
-    hands_on=(0, 2),
 )  # fmt: skip
 register(
     "light_queries_backward",
@@ -216,7 +170,6 @@ register(
     fake=lambda normals, *rest: normals.new_empty(normals.shape),
     setup_context=_keep_shade,
     backward=_shade_backward,
-    hands_on=(0, 2, 3, 4),
 )
 register(
     "split_sum_shade_backward",

@@ -117,7 +117,7 @@ def cached_occlusion(
     Args:
         cache: The mesh's bits; with hits where ``radiance`` is given.
         positions, normals: [n, 3] float32 positions (scene units) and unit normals n.
-        lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.query_direction`).
+        lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.light_queries`).
         roughness: [n, 1] float32 perceptual roughness in [0, 1].
         light: [k, 3] float32 mean radiance L_i of the environment over the cell of each of the cache's directions.
         radiance: [m, 3] float32 radiance that the mesh sends out, or None. A hit past the last row sends nothing.

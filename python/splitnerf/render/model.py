@@ -25,7 +25,7 @@ from splitnerf.fields import (
 )
 from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import HashGridSpec, light_queries, sharpness, split_sum_shade, summed_correction, take_rows, wide_lobes
+from splitnerf.ops import HashGridSpec, light_queries, split_sum_shade, summed_correction
 
 N_FEATURES = 2  # of a level of the hash grid
 N_OUTPUTS = 13  # of the surface's network, the distance among them
@@ -64,6 +64,27 @@ def on_surface(positions: Tensor, normals: Tensor, sdf: Tensor) -> Tensor:
     """Points [n, 3] moved along their unit normals [n, 3] by their signed distances [n] on to the surface, scene units;
     no gradient."""
     return torch.addcmul(positions.detach(), normals.detach(), sdf.detach()[:, None], value=-1.0)
+
+
+def sharpness(variance: Tensor) -> Tensor:
+    return torch.exp((10.0 * variance).clamp(0.0, 9.0))
+
+
+def wide_lobes(
+    candidates: Tensor, roughness: Tensor, low: float, high: float, n_candidates: Tensor | None
+) -> tuple[Tensor, Tensor]:
+    """The points whose lobes are wide enough for a sum over directions, and the share [m] by which it counts.
+
+    ``share = t^2 (3 - 2 t)``, t rising from 0 at the roughness `low` to 1 at `high`. With `n_candidates`, the number of
+    leading candidates that count, all stay and the others have a share of 0; else those with a share of 0 are left out.
+    """
+    t = ((roughness[:, 0].index_select(0, candidates) - low) / (high - low)).clamp(0, 1)
+    share = t * t * (3 - 2 * t)
+    if n_candidates is not None:
+        counts = torch.arange(len(candidates), device=candidates.device) < n_candidates
+        return candidates, torch.where(counts, share, 0)
+    wide = share.nonzero()[:, 0]
+    return candidates[wide], share[wide]
 
 
 def make_light(config: Config) -> Light:
@@ -134,7 +155,10 @@ class SceneModel(nn.Module):
 
     @property
     def s(self) -> Tensor:
-        """Sharpness s [] of the NeuS density, 1 / scene units."""
+        """Sharpness s = exp(10 v) [] of the NeuS density, in [1, e^9], 1 / scene units.
+
+        Source: NeuS (Wang et al. 2021), section 4.1, and its released code.
+        """
         return sharpness(self.variance)
 
     @property
@@ -191,13 +215,13 @@ class SceneModel(nn.Module):
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(*inputs)
-        *asked, normals, roughness = light_queries(normals, view_dirs, roughness, c.shading.query, hand_on=True)
+        asked = light_queries(normals, view_dirs, roughness, c.shading.query)
         lobe_dirs, facing = asked[0].chunk(2)
         surface = on_surface(positions, normals, outputs[:, 0])
         occlusion = self.occlusion(OcclusionQuery(inputs, surface, facing, lobe_dirs, roughness), segments)
-        shaded, normals, albedo, roughness, metallic = split_sum_shade(
+        shaded = split_sum_shade(
             normals, view_dirs, albedo, roughness, metallic, light(*asked), None, occlusion.specular, occlusion.diffuse,
-            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse, hand_on=True,
+            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse,
         )  # fmt: skip
         return ShadedPoints(
             shaded, normals, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs, surface
@@ -235,7 +259,7 @@ class SceneModel(nn.Module):
             points.normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, points.on_surface,
             points.facing.detach(),
         ]  # fmt: skip
-        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = take_rows(of_points, at)
+        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = (x.index_select(0, at) for x in of_points)
         visible, sent = self.occlusion.visibility(on_surface, facing)
         cells = light.cells
         return at, summed_correction(

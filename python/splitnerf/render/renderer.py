@@ -14,15 +14,13 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.fields import EvaluatedLight, RaySegments
 from splitnerf.ops import (
     PackedSamples,
-    add_corrections,
+    ShadingSubset,
     composite,
     linear_to_srgb,
     march_rays,
-    place_samples,
     sample_rays,
     spread_samples,
     surface_weights,
-    take_rows,
 )
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
@@ -179,13 +177,48 @@ def find_samples(
             reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
             max_samples=MAX_SAMPLES_PER_RAY, room=capacity,
         )  # fmt: skip
+    packed = packed.extended(max(0, capacity - len(packed.ray_indices)))
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
-    positions, directions, beside = place_samples(rays_o, rays_d, packed, *probes, capacity)
-    packed = packed.extended(len(directions) - len(packed.ray_indices))
+    positions, directions, beside = place_samples(rays_o, rays_d, packed, probes, padded=capacity > 0)
     if phase is None:  # the choice of shaded samples must not depend on their positions
         phase = (PHASES * jitter) % 1.0
     numbers = (positions.new_full((), x) for x in (step, anneal))
     return FoundSamples(packed, rays_d, phase, positions, directions, beside, *numbers, evaluated, n_found)
+
+
+def place_samples(
+    rays_o: Tensor, rays_d: Tensor, packed: PackedSamples, probes: ProbePoints, padded: bool
+) -> tuple[Tensor, Tensor, Tensor]:
+    """`positions`, `directions` and `beside` of :class:`FoundSamples`; the host does not wait for the number of samples.
+
+    Padding repeats the first samples, with directions of 0; without a sample all is 0.
+    """
+    rays, t, rows = packed.ray_indices, packed.middles, len(packed.ray_indices)
+    n: int | Tensor = rows
+    if padded:
+        n, numbers = packed.offsets[-1].clamp(max=rows), torch.arange(rows, device=rays.device)
+        first = numbers % n.clamp(min=1)
+        rays, t = rays[first], t[first]
+    directions = rays_d.index_select(0, rays)
+    middles = rays_o.index_select(0, rays) + directions * t[:, None]
+    if padded:
+        middles = torch.where(n > 0, middles, 0)
+        directions = torch.where((numbers < n)[:, None], directions, 0)
+    m = len(probes.chosen) if rows else 0
+    beside = (probes.chosen[:m] * n).long().clamp(max=n - 1).clamp(min=0)
+    points = middles.index_select(0, beside) + probes.shifts[:m]
+    return torch.cat([middles, probes.anywhere, points]), directions, beside
+
+
+def add_corrections(
+    mean: Tensor, correction: Tensor, at: Tensor, spread: ShadingSubset, ray_indices: Tensor, shares: Tensor, opacity: Tensor
+) -> Tensor:
+    """The rays' colours [n_rays, 3] with corrections [m, 3] of their shaded samples `at` [m], each by the share of the ray's
+    opacity that the sample's segment carries; `shares` [n_shaded] is the weight that each shaded sample stands for."""
+    rays = ray_indices.index_select(0, spread.shaded.index_select(0, at))
+    carried = shares.new_zeros(len(spread.leaders)).index_add(0, spread.stretch, shares)
+    part = carried.index_select(0, spread.stretch.index_select(0, at)) / opacity.index_select(0, rays).clamp(min=MIN_OPACITY)
+    return mean.index_add(0, rays, correction * part[:, None])
 
 
 def render_rays(
@@ -209,7 +242,7 @@ def render_rays(
     c = model.config
     samples, step, n = found.packed, found.step, len(found.directions)
     field, s = model.surface(found.positions), model.s
-    normals, weights, opacity, outputs, gradient = surface_weights(
+    normals, weights, opacity = surface_weights(
         field.outputs,
         field.gradient,
         found.rays_d,
@@ -219,21 +252,18 @@ def render_rays(
         anneal=found.anneal,
         min_transmittance=c.constants.min_transmittance,
         n_samples=n,
-        hand_on=True,
     )
-
-    outputs_of_all = outputs
     spread = spread_samples(weights.detach(), samples, shades_per_ray, found.phase, SURFACE_GAP, capacity, step)
     shaded = spread.shaded
-    of_samples = [found.positions, found.directions, normals, outputs, field.features]
-    positions, directions, normals, outputs, features = take_rows(of_samples, shaded)
+    of_samples = found.positions, found.directions, normals, field.outputs, field.features
+    positions, directions, normals, outputs, features = (x.index_select(0, shaded) for x in of_samples)
     view_dirs = -directions
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)
     points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
-    mean, opacity = composite(weights, values, samples.offsets, opacity, MIN_OPACITY, hand_on=True)
+    mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
     if model.sums_light:
         at, correction = model.quadrature_correction(
             light,
@@ -242,12 +272,10 @@ def render_rays(
             spread.heaviest,
             None if capacity is None else spread.sizes[1],
         )
-        mean = add_corrections(
-            mean, correction, at, shaded, samples.ray_indices, spread.stretch, shares, opacity.detach(), MIN_OPACITY
-        )
+        mean = add_corrections(mean, correction, at, spread, samples.ray_indices, shares, opacity.detach())
     return RenderedRays(
-        mean, c.shading.compositing == "linear", opacity, s, samples, found.evaluated, found.n_found, weights, values, gradient,
-        outputs_of_all[n : len(found.positions) - len(found.beside), 0], found.beside,
+        mean, c.shading.compositing == "linear", opacity, s, samples, found.evaluated, found.n_found, weights, values, field.gradient,
+        field.outputs[n : len(found.positions) - len(found.beside), 0], found.beside,
         shaded, spread.sizes, shares, positions, normals, sdf, points,
     )  # fmt: skip
 

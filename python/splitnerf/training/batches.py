@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -9,7 +10,6 @@ from torch import Tensor
 
 from splitnerf.config import Config
 from splitnerf.data.pixels import at_unit_exposure
-from splitnerf.ops import probe_points
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import ProbePoints
 
@@ -87,5 +87,8 @@ def make_probes(config: Config, chosen: Tensor, random: Tensor) -> ProbePoints:
         chosen, random: Numbers in [0, 1), as many as :func:`probe_counts` says.
     """
     c = config
-    anywhere, shifts = probe_points(random, c.constants.eikonal_points, c.constants.box, c.constants.smoothness_radius)
-    return ProbePoints(anywhere, chosen, shifts)
+    first, u = random.split([3 * c.constants.eikonal_points, 4 * len(chosen)])
+    radius, angle = torch.sqrt(-2 * torch.log1p(-u[::2])), 2 * math.pi * u[1::2]  # Box and Muller 1958
+    even, odd = (radius * torch.cos(angle)).view(-1, 2), (radius * torch.sin(angle)).view(-1, 2)
+    shifts = c.constants.smoothness_radius * torch.cat([even[:, :1], odd[:, :1], even[:, 1:]], dim=1)
+    return ProbePoints(c.constants.box * (2 * first.view(-1, 3) - 1), chosen, shifts)

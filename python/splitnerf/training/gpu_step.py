@@ -14,7 +14,6 @@ from torch import Tensor
 from torch.utils._pytree import tree_leaves, tree_map
 
 from splitnerf.fields import EvaluatedLight
-from splitnerf.ops import clear_unless
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import FoundSamples, RenderedRays
 from splitnerf.training.batches import Batch
@@ -91,9 +90,9 @@ class GpuStep(Step):
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
     ) -> Iterable[StepNumbers]:
         pending = self.begin(batch, light, environment, step, progress)
-        grads = [leaf.grad for leaf in light.leaves if leaf.grad is not None]
-        if grads:
-            clear_unless(grads, pending.allowed)  # they would stay until the light moves
+        for leaf in light.leaves:
+            if leaf.grad is not None:
+                leaf.grad.masked_fill_(~pending.allowed, 0.0)  # it would stay until the light moves
         self.optimiser.step(allowed=pending.allowed)
         pending.counted = self.optimiser.counted
         if self.exposures.learned and progress > BEGIN:

@@ -15,7 +15,7 @@ from torch import Tensor
 from splitnerf.devices import pinned, start_fetching
 from splitnerf.fields import EvaluatedLight
 from splitnerf.notes import note
-from splitnerf.ops import AdamW, step_numbers
+from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import FoundSamples, RenderedRays, find_samples, render_rays
@@ -191,9 +191,10 @@ class Step:
     def fetch(self, step: int, batch: Batch, ray: RenderedRays, terms: Terms) -> PendingNumbers:
         """Starts to fetch the numbers of a step whose gradients are at the parameters."""
         gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
-        values, counts = [term.value for term in terms.values()], [ray.n_found, ray.sizes]
-        limits = _limits(len(terms), self.capacity, ray.mean.device)
-        numbers, allowed = step_numbers(gradients, values, counts, ray.evaluated, ray.s.detach(), limits)
+        numbers = torch.stack([*(term.value for term in terms.values()), torch.nn.utils.get_total_norm(gradients, foreach=True)])
+        counts = torch.cat([ray.n_found[None], ray.sizes, ray.evaluated.sum()[None]])
+        numbers = torch.cat([numbers, counts, ray.s[None]]).detach()
+        allowed = (numbers.abs() < _limits(len(terms), self.capacity, numbers.device)).all()  # false for NaN
         weights = {name: term.weight for name, term in terms.items()}
         return PendingNumbers(step, len(batch.target), weights, self.capacity, allowed, start_fetching(numbers))
 

@@ -14,7 +14,7 @@ from splitnerf.config import preset
 from splitnerf.fields.light import EvaluatedLight
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.visibility import VisibilityBits
-from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe, trace_visibility
+from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe
 from splitnerf_tools.bench.charts import Chart, Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, rms
 from splitnerf_tools.bench.lights import MapLight, lights
@@ -139,7 +139,7 @@ def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
     for directions in (cosine, lobe):
         flat = directions.reshape(-1, 3)
         radiance = points.light(flat).view(count, n, 3) * ((directions * normals).sum(-1, keepdim=True) > 0)
-        seen = trace_visibility(points.scene, origins, flat).view(count, n, 1)
+        seen = points.scene.is_open(origins, flat).view(count, n, 1)
         factors.append((radiance * seen).sum(1) / radiance.sum(1).clamp(min=1e-12))
     return factors[0], factors[1]
 
@@ -152,20 +152,20 @@ def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list
     directions = torch.cat([cosine, lobes], dim=1).reshape(-1, 3)
     starts = points.positions + OFFSET * points.normals
     origins = starts[:, None].expand(n, 2 * half, 3).reshape(-1, 3).contiguous()
-    seen = trace_visibility(points.scene, origins, directions)
+    seen = points.scene.is_open(origins, directions)
     tracers = {"Open3D test_occlusions": open3d_tracer} | (
         {} if quick else {"trimesh + embreex": embreex_tracer, "mitsuba ray_test": mitsuba_tracer}
     )
     calls: dict[str, Callable[[], object]] = {
         "splitnerf occlusion_factors": lambda: points.traced(half, half),
-        "splitnerf trace_visibility": lambda: trace_visibility(points.scene, origins, directions),
+        "splitnerf is_open": lambda: points.scene.is_open(origins, directions),
     }
     for tracer, make in tracers.items():
         call = make(points, origins, directions)
         if call is None:
             continue
         differing = float((torch.from_numpy(np.asarray(call(), bool)) == seen).float().mean())
-        check("share of the rays that trace_visibility answers otherwise", {tracer: differing}, DISAGREEMENT)
+        check("share of the rays that is_open answers otherwise", {tracer: differing}, DISAGREEMENT)
         calls[tracer] = call
     times = interleaved(calls, rounds)
     ours = "splitnerf occlusion_factors"

@@ -24,16 +24,15 @@ RAYS = torch.tensor([0, 16, 16, N])  # where the samples of three rays begin and
 
 # The arguments to which an operator has a gradient.
 DIFFERENTIABLE = {
-    "add_corrections": "mean correction", "composite": "weights values opacity", "gradient_losses": "gradients",
-    "hash_encode": "table", "hash_encode_jacobian": "positions table", "interpolate": "values", "light_lookup":
+    "composite": "weights values opacity", "gradient_losses": "gradients",
+    "hash_encode": "positions table", "interpolate": "values", "light_lookup":
     "directions roughness levels sh", "light_prior": "texels", "light_queries": "normals roughness",
     "linear_to_srgb": "linear",
-    "log_chroma": "radiance", "material_losses": "metallic", "material_network": "inputs weights biases",
-    "monte_carlo_light": "normals roughness radiance", "neus_weights": "f_prev f_next s",
+    "monte_carlo_light": "normals roughness radiance",
     "pixel_losses": "mean opacity",
-    "prefilter_light": "light", "query_direction": "normals view_dirs roughness",
+    "prefilter_light": "light",
     "sdf_field": "table hidden hidden_length hidden_bias out out_length out_bias",
-    "shade_sums": "normals view_dirs albedo roughness metallic sums other", "sharpness": "variance",
+    "shade_sums": "normals view_dirs albedo roughness metallic sums other",
     "sparse_product": "values",
     "split_sum_shade": "normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d",
     "summed_light": "normals roughness radiance", "surface_weights": "sdf gradient s",
@@ -85,8 +84,8 @@ def usual() -> dict[str, object]:
         positions=0.52 + 0.45 * sphere(N), table=pattern(SPEC.n_entries, 2), box=1.5, directions=sphere(64),
         radiance=pattern(64, 3), weights=0.05 * pattern(N), opacity=0.6 * pattern(N), index=torch.arange(N).flip(0),
         jitter=torch.zeros(N), step=0.1, min_transmittance=0.0, light_dirs=sphere(256), light=pattern(256, 3),
-        n_samples=64, seed=0, linear=pattern(N) - 0.5, srgb=pattern(N) - 0.5, variance=0.5 * pattern(N),
-        texels=2 * pattern(N, 3) - 2, level_sizes=[4, N - 4], x=pattern(N, 4), smooth_l1=False, values=pattern(5, 3),
+        n_samples=64, seed=0, linear=pattern(N) - 0.5, srgb=pattern(N) - 0.5,
+        texels=2 * pattern(N, 3) - 2, level_sizes=[4, N - 4], x=pattern(N, 4), values=pattern(5, 3),
         first=torch.arange(N) % 4, second=torch.arange(N) % 4 + 1, min_roughness=0.2, rays_o=axis(0.0, 0.0, 3.0),
         rays_d=axis(0.0, 0.0, -1.0), max_samples=64, environment=pattern(4, 8, 3), scene=square().handle,
     )  # fmt: skip
@@ -100,13 +99,6 @@ def cells() -> Tensor:
 def ahead() -> Tensor:
     """Distances along rays that cross a flat surface at a right angle."""
     return torch.cat([0.8 - 0.1 * torch.arange(16), 1.0 - 0.1 * torch.arange(22)])
-
-
-def corrections() -> dict:
-    every = torch.arange(2 * N)
-    return dict(mean=pattern(N, 3), correction=2 * pattern(2 * N, 3), at=every, shaded=every, ray_indices=every // 2,
-                segment=every // 2, weights=0.1 + 0.1 * pattern(2 * N), opacity=0.2 + 0.3 * pattern(N),
-                min_opacity=1e-4)  # fmt: skip
 
 
 def camera() -> dict:
@@ -157,11 +149,6 @@ def mirror() -> dict:
                 clamp_indirect=0.0)  # fmt: skip
 
 
-def rows() -> dict:
-    index = torch.cat([torch.arange(0, N, 2), torch.zeros(3, dtype=torch.int64)])
-    return dict(tensors=[pattern(len(index), 2), pattern(len(index), 1)], index=index, n_rows=[N, N + 5])
-
-
 def optimiser() -> dict:
     """One step of two parameters."""
     params, grads = ([x(N), x(5)] for x in (pattern, lambda n: pattern(n) - 1))
@@ -171,48 +158,29 @@ def optimiser() -> dict:
                 copies=[torch.zeros(5).half()], copied=[1], allowed=None)  # fmt: skip
 
 
-def one_parameter() -> dict:
-    two = optimiser()
-    first = {name[:-1]: two[name][0] for name in ("params", "grads", "exp_avgs", "exp_avg_sqs", "lrs", "weight_decays",
-                                                  "steps")}
-    return two | first | dict(exp_avg_sq=first["exp_avg_sq"], sparse=False, copy=None)
-
-
 def neighbours() -> dict:
     return dict(gradients=pattern(N, 3) - 0.8, weights=pattern(16), beside=torch.arange(N - 16) % 16)
 
 
 OWN: dict[str, Callable[[], dict[str, object]]] = {
-    "adamw_step_": one_parameter, "adamw_steps_": optimiser, "add_corrections": corrections,
+    "adamw_steps_": optimiser,
     "cached_occlusion": lambda: dict(positions=0.2 * sphere(N), normals=axis(0.0, 0.0, 1.0),
                                      lobe_dirs=axis(0.0, 0.0, 1.0), radiance=pattern(1, 3), light=pattern(64, 3)),
     "cached_visibility": lambda: dict(positions=0.2 * sphere(N), normals=axis(0.0, 0.0, 1.0), radiance=pattern(1, 3)),
-    "clear_unless_": lambda: dict(tensors=[pattern(N), pattern(5)], kept=torch.tensor(True)),
     "composite": lambda: dict(values=pattern(N, 3), opacity=pattern(3), least_opacity=0.75),
     "draw_rays": camera, "gradient_losses": neighbours, "incoming_light": mirror, "light_lookup": sphere_light,
-    "log_chroma": lambda: dict(radiance=pattern(N, 3).flip(0)),
     "march_rays": lambda: dict(rays_o=torch.cat([torch.full((N, 1), -3.0), pattern(N, 2) - 1], 1),
                                rays_d=axis(1.0, 0.0, 0.0), cells=cells()),
-    "material_losses": lambda: dict(shares=pattern(N)),
-    "material_network": lambda: dict(inputs=[pattern(N, 2), pattern(N, 3)],
-                                     weights=[pattern(4, 5) - 1, pattern(5, 4) - 1],
-                                     biases=[pattern(4) + 0.3, pattern(5) - 1]),
     "monte_carlo_light": lambda: dict(light_dirs=sphere(32)[:16].repeat(N, 1, 1), pdf=pattern(N, 16),
                                       radiance=pattern(N, 16, 3)),
-    "neus_weights": lambda: dict(f_prev=ahead(), f_next=ahead() - 0.1),
     "occlusion_factors": lambda: dict(positions=0.3 * sphere(N), n_diffuse_rays=64, n_specular_rays=64, offset=0.0125,
                                       along_ray=False),
     "pixel_losses": lambda: dict(mean=0.1 * pattern(N, 3), opacity=0.5 * pattern(N), target=0.6 * pattern(N, 4),
                                  background=0.4 * pattern(N, 3), whole=torch.arange(N) % 2 == 1, exposure=pattern(N, 3),
                                  linear=True),
-    "place_samples": lambda: dict(rays_d=sphere(N), ray_indices=torch.arange(N), t_starts=torch.zeros(N),
-                                  t_ends=pattern(N), offsets=torch.arange(N + 1), anywhere=pattern(4, 3),
-                                  chosen=torch.full((4,), 1.5 / N), shifts=pattern(4, 3), room=N + 1),
     "prefilter_light": lambda: dict(query_dirs=sphere(N), roughness=torch.full((N, 1), 0.5)),
-    "probe_points": lambda: dict(random=0.6 * pattern(3 * N + 16), n_anywhere=N, deviation=0.5),
-    "put_rows": rows, "read_pixels": photo,
+    "read_pixels": photo,
     "sample_ggx_lobe": lambda: dict(axes=sphere(N)),
-    "sample_bsdf": lambda: dict(specular_share=torch.full((N, 1), 0.4)),
     "sample_rays": lambda: dict(cells=torch.ones(2, 2, 2, dtype=torch.uint8), table=torch.zeros(SPEC.n_entries, 2),
                                 hidden=torch.tensor([[0.0, 0.0, 1.0] + 4 * [0.0]]), hidden_bias=torch.zeros(1),
                                 out=torch.ones(1, 1), out_bias=torch.zeros(1), beta=1.0, s=10.0, anneal=1.0,
@@ -224,17 +192,11 @@ OWN: dict[str, Callable[[], dict[str, object]]] = {
     "spread_samples": lambda: dict(weights=torch.tensor([2.0, 0.0, 0.0, 1.0]).repeat(N),
                                    t=torch.tensor([0.0, 1.0, 2.0, 4.0]).repeat(N), offsets=4 * torch.arange(N + 1),
                                    phase=torch.full((N,), 0.5), gap=10.0, per_ray=2),
-    "step_numbers": lambda: dict(gradients=[pattern(N, 1), torch.tensor(4.0)], terms=[torch.tensor([0.5])],
-                                 counts=[torch.tensor([7])], evaluated=torch.ones(N, dtype=torch.int64),
-                                 s=torch.tensor(2.0), limits=torch.full((5,), 100.0)),
     "summed_light": lambda: dict(solid_angles=pattern(64), visible=0.5 * pattern(N, 64), sent=pattern(N, 64, 3)),
     "surface_weights": lambda: dict(sdf=ahead() - 0.05, gradient=pattern(N, 3).flip(0), rays_d=axis(0.0, 0.0, -1.0, 3),
                                     step=torch.tensor(0.1), anneal=torch.tensor(1.0), n_samples=-1),
-    "take_rows": lambda: dict(tensors=[pattern(N, 2), pattern(N, 1)]),
-    "trace_visibility": lambda: dict(origins=torch.zeros(256, 3), directions=sphere(256), t_far=math.inf),
     "vertex_grids": lambda: dict(vertices=torch.cat([axis(0.0, 0.0, 0.0, 16), axis(5.0, 6.0, 7.0, N - 16)]),
                                  radius=0.1, n_levels=3),
     "visibility_bits": lambda: dict(positions=torch.zeros(1, 3), normals=axis(0.0, 0.0, 1.0, 1), offset=0.0,
                                     with_hits=True),
-    "wide_lobes": lambda: dict(candidates=torch.arange(N), low=0.25, high=0.75, n_candidates=torch.tensor(N - 1)),
 }  # fmt: skip

@@ -22,7 +22,7 @@ from splitnerf_tools.doctor.cases import DIFFERENTIABLE, OWN, pattern, usual
 
 TOLERANCE = 5e-5  # share of the sum of absolute values
 # Meshes are traced on the CPU, in float32, and a ray at an edge may fall on its other side.
-CPU_ALONE = {"incoming_light", "occlusion_factors", "trace_visibility", "vertex_grids", "visibility_bits"}
+CPU_ALONE = {"incoming_light", "occlusion_factors", "vertex_grids", "visibility_bits"}
 TOLERANCE_OF_RAYS = 5e-3
 MODULUS = 61  # of whole numbers
 READ_ON_THE_CPU = {"resolutions", "nodes"}  # arguments

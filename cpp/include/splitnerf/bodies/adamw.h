@@ -41,6 +41,7 @@ SPLITNERF_HD void adamw_number(const AdamwRule<T>& rule, T grad, T& param, T& ex
   param = param * rule.decay - rule.rate * exp_avg / (std::sqrt(exp_avg_sq) * rule.correction + rule.eps);
 }
 
+// One array; a part of AdamwListBody.
 template <class T> struct AdamwBody {
   AdamwRule<T> rule;
   AdamwArrays<T> x;
@@ -59,7 +60,6 @@ template <class T> struct AdamwBody {
     return false;
   }
 };
-SPLITNERF_ON_GPU(AdamwBody);
 
 // Some arrays, each with its rule, as one list of numbers: array k has those from ends[k - 1] to ends[k]. Nothing moves where
 // `allowed` is not null and false.

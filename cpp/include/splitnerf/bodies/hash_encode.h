@@ -47,22 +47,15 @@ SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const S*
   return out;
 }
 
-// features [n, C] and jacobian [n, 3, C], C = n_levels F; closed levels are written as 0.
-template <class T, int F, bool WithJacobian, class S = T> struct HashEncodeBody {
+// features [n, C], C = n_levels F; closed levels are written as 0.
+template <class T, int F, class S = T> struct HashEncodeBody {
   HashGridView<T, S> grid;
-  T *features, *jacobian;
+  T* features;
 
   SPLITNERF_HD void operator()(int64_t p, int l) const {
     LevelFeatures<T, F> at;
     if (l < grid.n_active) at = level_features<F>(grid.levels[l], grid.table, load3(grid.positions + 3 * p));
-    const int64_t columns = int64_t(grid.n_levels) * F;
-    store_pack(features + p * columns + l * F, at.value);
-    if constexpr (WithJacobian) {
-      T* row = jacobian + 3 * p * columns + l * F;
-      store_pack(row, at.dx);
-      store_pack(row + columns, at.dy);
-      store_pack(row + 2 * columns, at.dz);
-    }
+    store_pack(features + p * grid.n_levels * F + l * F, at.value);
   }
 };
 
@@ -90,55 +83,34 @@ SPLITNERF_HD void scatter_level(const HashLevel& level, Vec3<T> position, const 
   scatter_corner<6>(cell, from, grad_table), scatter_corner<7>(cell, from, grad_table);
 }
 
-// Adds to grad_table the gradients of open level l; grad_jacobian may be null.
+// Adds to grad_table the gradients of open level l.
 template <class T, int F> struct HashScatterBody {
   HashGridView<T> grid;
-  const T *grad_features, *grad_jacobian;
+  const T* grad_features;
   T* grad_table;
 
   SPLITNERF_HD void operator()(int64_t p, int l) const {
-    const int64_t columns = int64_t(grid.n_levels) * F;
     LevelGradients<T, F> from;
-    from.value = load_pack<F>(grad_features + p * columns + l * F);
-    if (grad_jacobian) {
-      const T* row = grad_jacobian + 3 * p * columns + l * F;
-      from.dx = load_pack<F>(row), from.dy = load_pack<F>(row + columns), from.dz = load_pack<F>(row + 2 * columns);
-    }
+    from.value = load_pack<F>(grad_features + p * grid.n_levels * F + l * F);
     scatter_level(grid.levels[l], load3(grid.positions + 3 * p), from, grad_table);
   }
 };
 
-// Adds one level's part of the gradient to the position of point p; grad_features and grad_jacobian may be null.
-template <int F, class T, class S>
-SPLITNERF_HD void add_position_gradient(const HashLevel& level, int l, int n_levels, int64_t p, const T* positions,
-                                        const S* table, const T* grad_features, const T* grad_jacobian, Vec3<T>& grad) {
-  const int64_t columns = int64_t(n_levels) * F;
-  const HashCell<T> cell = hash_cell(level, load3(positions + 3 * p));
-  for (int i = 0; i < 8; ++i) {
-    const CornerWeight<T> w = corner_weight_derivatives(cell, i);
-    for (int f = 0; f < F; ++f) {
-      const T entry = widen(table[cell.index[i] * F + f]);
-      if (grad_features) grad += w.d * (entry * grad_features[p * columns + l * F + f]);
-      if (!grad_jacobian) continue;
-      const T* gj = grad_jacobian + p * 3 * columns + l * F + f;
-      const T gx = gj[0], gy = gj[columns], gz = gj[2 * columns];
-      grad += Vec3<T>{w.dxy * gy + w.dxz * gz, w.dxy * gx + w.dyz * gz, w.dxz * gx + w.dyz * gy} * entry;
-    }
-  }
-}
-
 // grad_positions [n, 3], one thread a point.
 template <class T, int F, class S = T> struct HashPositionsBody {
   HashGridView<T, S> grid;
-  const T *grad_features, *grad_jacobian;
+  const T* grad_features;
   T* grad_positions;
 
   SPLITNERF_HD void operator()(int64_t p) const {
-    Vec3<T> grad{T(0), T(0), T(0)};
-    for (int l = 0; l < grid.n_active; ++l)
-      add_position_gradient<F>(grid.levels[l], l, grid.n_levels, p, grid.positions, grid.table, grad_features,
-                               grad_jacobian, grad);
-    store3(grad_positions + 3 * p, grad);
+    const Vec3<T> position = load3(grid.positions + 3 * p);
+    const T* grad = grad_features + p * grid.n_levels * F;
+    Vec3<T> sum{T(0), T(0), T(0)};
+    for (int l = 0; l < grid.n_active; ++l) {
+      const LevelFeatures<T, F> at = level_features<F>(grid.levels[l], grid.table, position);
+      for (int f = 0; f < F; ++f) sum += Vec3<T>{at.dx[f], at.dy[f], at.dz[f]} * grad[l * F + f];
+    }
+    store3(grad_positions + 3 * p, sum);
   }
 };
 

@@ -1,34 +1,9 @@
-// Losses of the light and their gradients, one item per call; the sums over items are added to `sums`, in double.
+// The loss of the light and its gradient, one texel per call; the sums over items are added to `sums`, in double.
 #pragma once
 
 #include "splitnerf/light_losses.h"
 
 namespace splitnerf {
-
-// sums = {chroma}
-template <class T> struct LogChromaBody {
-  static constexpr int n_sums = 1;
-  int64_t n;
-  const T* radiance;
-  T* loss;
-
-  SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    sums[0] += double(log_chroma(load3(radiance + 3 * i)).value);
-  }
-  SPLITNERF_HD void finish(const double* sums) const { *loss = T(sums[0] / double(max_of<int64_t>(n, 1))); }
-};
-SPLITNERF_ON_GPU(LogChromaBody);
-
-template <class T> struct LogChromaBackwardBody {
-  int64_t n;
-  const T *radiance, *grad_loss;
-  T* grad_radiance;
-
-  SPLITNERF_HD void operator()(int64_t i) const {
-    store3(grad_radiance + 3 * i, log_chroma(load3(radiance + 3 * i)).by_radiance * (*grad_loss / T(n)));
-  }
-};
-SPLITNERF_ON_GPU(LogChromaBackwardBody);
 
 // The texels of a light's levels, the coarsest first. Their mean over it, a few texels that each call adds up for itself, is the
 // brightness of the whole light: that costs nothing.

@@ -124,49 +124,6 @@ template <class T> struct SamplesOfPairsBackwardBody {
 };
 SPLITNERF_ON_GPU(SamplesOfPairsBackwardBody);
 
-// What the losses of materials read.
-template <class T> struct MaterialLossArrays {
-  const T *albedo, *metallic, *shares;
-  bool smooth_l1;
-
-  SPLITNERF_HD MaterialLosses<T> at(int64_t i) const {
-    return material_losses(load3(albedo + 3 * i), metallic[i], smooth_l1);
-  }
-};
-
-// sums = {metal, binary, dark, share}
-template <class T> struct MaterialLossesBody {
-  static constexpr int n_sums = 4;
-  MaterialLossArrays<T> in;
-  T *losses, *total;  // [3], and the sum of the shares
-
-  SPLITNERF_HD void operator()(int64_t i, double* sums) const {
-    const auto point = in.at(i);
-    const T share = in.shares[i];
-    sums[0] += double(share * point.metal), sums[1] += double(share * point.binary);
-    sums[2] += double(share * point.dark), sums[3] += double(share);
-  }
-  SPLITNERF_HD void finish(const double* sums) const {
-    for (int k = 0; k < 3; ++k) losses[k] = T(sums[k] / max_of(sums[3], kLeastWeight));
-    *total = T(sums[3]);
-  }
-};
-SPLITNERF_ON_GPU(MaterialLossesBody);
-
-template <class T> struct MaterialLossesBackwardBody {
-  MaterialLossArrays<T> in;
-  const T *total, *grad_losses;
-  T* grad_metallic;
-
-  SPLITNERF_HD void operator()(int64_t i) const {
-    const auto point = in.at(i);
-    const T slope =
-        grad_losses[0] * point.metal_slope + grad_losses[1] * point.binary_slope + grad_losses[2] * point.dark_slope;
-    grad_metallic[i] = slope * (in.shares[i] / max_of(*total, T(kLeastWeight)));
-  }
-};
-SPLITNERF_ON_GPU(MaterialLossesBackwardBody);
-
 // ---- quadratic entropy: E = -ln(sum_ij k_ij / n^2),  dE / dx_i = sum_j k_ij (x_i - x_j) / sum k ----
 
 // rows [n, n_channels + 1] = {sum_j k_ij (x_i - x_j), sum_j k_ij}, k_ij = exp(-|x_i - x_j|^2 / 4); a group of threads a point.

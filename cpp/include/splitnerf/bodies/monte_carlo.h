@@ -31,29 +31,6 @@ template <class T> struct SampleLobeBody {
 };
 SPLITNERF_ON_GPU(SampleLobeBody);
 
-// directions [n, n_samples, 3], pdf [n, n_samples]; a group of threads a point.
-template <class T> struct SampleBsdfBody {
-  const T *normals, *view_dirs, *roughness, *specular_share;
-  int n_samples;
-  uint32_t seed;
-  T *directions, *pdf;
-
-  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t i) const {
-    const Vec3<T> view = load3(view_dirs + 3 * i);
-    const Vec3<T> given = load3(normals + 3 * i), normal = given * facing(given, view);
-    const T ggx_alpha = sampled_alpha(roughness[i]);
-    const Vec2<T> shift = lattice_shift<T>(seed, i);
-    const LobeChoice<T> lobes(specular_share[i], n_samples, random_unit<T>(seed, static_cast<uint32_t>(i), 2));
-    for (int k = group.lane(); k < n_samples; k += Group::size) {
-      const int64_t at = i * n_samples + k;
-      const Vec3<T> l = lobes.sample(normal, view, ggx_alpha, k, shift);
-      store3(directions + 3 * at, l);
-      pdf[at] = lobes.pdf(normal, view, l, ggx_alpha);
-    }
-  }
-};
-SPLITNERF_ON_GPU(SampleBsdfBody);
-
 // The directions of one point, drawn for it.
 template <class T> struct DrawnLight {
   int n;
@@ -107,7 +84,6 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
   const T* grad_sums;
   T *grad_normals, *grad_roughness;
   Receive receive;
-  const T *more_normals = nullptr, *more_roughness = nullptr;  // gradients of other readers, or null
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
     const LightSumsGrad<T> out =
@@ -115,8 +91,8 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
                            load_sums(grad_sums + 3 * kLightSums * p),
                            [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
-    store3(grad_normals + 3 * p, out.normal + load3_if(more_normals, p));
-    grad_roughness[p] = out.roughness + load_if(more_roughness, p);
+    store3(grad_normals + 3 * p, out.normal);
+    grad_roughness[p] = out.roughness;
   }
 };
 

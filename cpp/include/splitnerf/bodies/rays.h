@@ -68,43 +68,6 @@ struct OccupiedBlocksBody {
 };
 SPLITNERF_ON_GPU_TYPE(OccupiedBlocksBody);
 
-// weights [n], opacity [n_rays]
-template <class T> struct NeusWeightsBody {
-  PackedRays rays;
-  const T *f_prev, *f_next, *s;
-  T min_transmittance;
-  T *weights, *opacity;
-
-  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
-    const SampleRange ray = rays.samples_of(r);
-    const NeusEnds<T> ends{f_prev + ray.first, f_next + ray.first, nullptr};
-    const T sum = neus_ray_weights(group, ends, *s, ray.n, min_transmittance, weights + ray.first);
-    if (group.lane() == 0) opacity[r] = sum;
-    rays.for_each_unowned(group, r, [&](int64_t i) { weights[i] = T(0); });
-  }
-};
-SPLITNERF_ON_GPU(NeusWeightsBody);
-
-template <class T> struct NeusWeightsBackwardBody {
-  PackedRays rays;
-  const T *f_prev, *f_next, *s;
-  T min_transmittance;
-  const T *weights, *grad_weights, *grad_opacity;
-  T *grad_f_prev, *grad_f_next, *grad_s_rays;
-
-  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
-    const SampleRange ray = rays.samples_of(r);
-    const NeusEnds<T> ends{f_prev + ray.first, f_next + ray.first, nullptr};
-    T *to_prev = grad_f_prev + ray.first, *to_next = grad_f_next + ray.first;
-    const T grad_s = neus_ray_weights_backward(
-        group, ends, *s, ray.n, min_transmittance, weights + ray.first, grad_weights + ray.first, grad_opacity[r],
-        to_next, [&](int64_t i, const OpticalDepthGrad<T>& g) { to_prev[i] = g.f_prev, to_next[i] = g.f_next; });
-    if (group.lane() == 0) grad_s_rays[r] = grad_s;
-    rays.for_each_unowned(group, r, [&](int64_t i) { grad_f_prev[i] = grad_f_next[i] = T(0); });
-  }
-};
-SPLITNERF_ON_GPU(NeusWeightsBackwardBody);
-
 // The samples of one ray of a surface. Each call computes the interval of a sample.
 template <class T> struct SurfaceIntervals {
   const SurfaceSamples<T>& in;
@@ -137,19 +100,17 @@ template <class T> struct SurfaceWeightsBody {
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBody);
 
-// grad_sdf [n_rows, stride] and grad_gradient [n_rows, 3], to which those of other readers of sdf and gradient are added, where
-// they are not null; `depths` [n] is work memory.
+// grad_sdf [n_rows, stride] and grad_gradient [n_rows, 3]; `depths` [n] is work memory.
 template <class T> struct SurfaceWeightsBackwardBody {
   SurfaceSamples<T> in;
   const T *weights, *grad_normals, *grad_weights, *grad_opacity;
   T *grad_sdf, *grad_gradient, *grad_s_rays, *depths;
-  const T *more_sdf = nullptr, *more_gradient = nullptr;
 
   SPLITNERF_HD void store(int64_t i, T by_sdf, Vec3<T> by_gradient) const {
     const int64_t row = i * in.stride;
-    grad_sdf[row] = by_sdf + load_if(more_sdf, row);
-    for (int64_t c = row + 1; c < row + in.stride; ++c) grad_sdf[c] = load_if(more_sdf, c);
-    store3(grad_gradient + 3 * i, by_gradient + load3_if(more_gradient, i));
+    grad_sdf[row] = by_sdf;
+    for (int64_t c = row + 1; c < row + in.stride; ++c) grad_sdf[c] = T(0);
+    store3(grad_gradient + 3 * i, by_gradient);
   }
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
     const SampleRange ray = in.rays.samples_of(r);
@@ -168,23 +129,6 @@ template <class T> struct SurfaceWeightsBackwardBody {
   }
 };
 SPLITNERF_ON_GPU(SurfaceWeightsBackwardBody);
-
-// s = exp(10 v), one number a call.
-template <class T> struct SharpnessBody {
-  const T* variance;
-  T* s;
-
-  SPLITNERF_HD void operator()(int64_t i) const { s[i] = sharpness(variance[i]).value; }
-};
-SPLITNERF_ON_GPU(SharpnessBody);
-
-template <class T> struct SharpnessBackwardBody {
-  const T *variance, *grad_s;
-  T* grad_variance;
-
-  SPLITNERF_HD void operator()(int64_t i) const { grad_variance[i] = grad_s[i] * sharpness(variance[i]).slope; }
-};
-SPLITNERF_ON_GPU(SharpnessBackwardBody);
 
 // What is added up along rays: weights [n] times values [n, n_channels]. The sums are divided by the rays' opacity, at least
 // `least`; without opacities by 1.
@@ -220,7 +164,6 @@ template <class T> struct CompositeBackwardBody {
   CompositeArrays<T> in;
   const T* grad_sums;
   T *grad_weights, *grad_values, *grad_opacity;
-  const T* more_opacity = nullptr;  // gradient of another reader, or null
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
     const SampleRange ray = in.rays.samples_of(r);
@@ -238,8 +181,7 @@ template <class T> struct CompositeBackwardBody {
     }
     if (in.opacity) {
       pulled = group.sum(pulled);
-      const T own = in.opacity[r] >= in.least ? T(-pulled / double(divisor)) : T(0);
-      if (group.lane() == 0) grad_opacity[r] = own + load_if(more_opacity, r);
+      if (group.lane() == 0) grad_opacity[r] = in.opacity[r] >= in.least ? T(-pulled / double(divisor)) : T(0);
     }
     in.rays.for_each_unowned(group, r, [&](int64_t i) {
       grad_weights[i] = T(0);

@@ -2,39 +2,9 @@
 #pragma once
 
 #include "splitnerf/monte_carlo.h"
-#include "splitnerf/principled.h"
 #include "splitnerf/split_sum.h"
 
 namespace splitnerf {
-
-template <class T> struct QueryDirectionBody {
-  const float* lut;
-  bool mean;
-  const T *normals, *view_dirs, *roughness;
-  T* directions;
-
-  SPLITNERF_HD void operator()(int64_t i) const {
-    store3(directions + 3 * i,
-           query_direction(lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i]));
-  }
-};
-SPLITNERF_ON_GPU(QueryDirectionBody);
-
-template <class T> struct QueryDirectionBackwardBody {
-  const float* lut;
-  bool mean;
-  const T *normals, *view_dirs, *roughness, *grad_directions;
-  T *grad_normals, *grad_view_dirs, *grad_roughness;
-
-  SPLITNERF_HD void operator()(int64_t i) const {
-    const QueryDirectionGrad<T> g = query_direction_backward(
-        lut, mean, load3(normals + 3 * i), load3(view_dirs + 3 * i), roughness[i], load3(grad_directions + 3 * i));
-    store3(grad_normals + 3 * i, g.normal);
-    store3(grad_view_dirs + 3 * i, g.view);
-    grad_roughness[i] = g.roughness;
-  }
-};
-SPLITNERF_ON_GPU(QueryDirectionBackwardBody);
 
 // What shading asks the light at n points: the directions of the specular lobes with their roughness, then those of the
 // diffuse light, the normals on the viewer's side, with a roughness of 1.
@@ -61,15 +31,13 @@ template <class T> struct LightQueriesBackwardBody {
   int64_t n;
   const T *normals, *view_dirs, *roughness, *grad_directions, *grad_asked_roughness;
   T *grad_normals, *grad_roughness;
-  const T *more_normals = nullptr, *more_roughness = nullptr;  // gradients of other readers, or null
 
   SPLITNERF_HD void operator()(int64_t i) const {
     const Vec3<T> normal = load3(normals + 3 * i), view = load3(view_dirs + 3 * i);
     const QueryDirectionGrad<T> g =
         query_direction_backward(lut, mean, normal, view, roughness[i], load3(grad_directions + 3 * i));
-    store3(grad_normals + 3 * i,
-           g.normal + load3(grad_directions + 3 * (n + i)) * facing(normal, view) + load3_if(more_normals, i));
-    grad_roughness[i] = g.roughness + grad_asked_roughness[i] + load_if(more_roughness, i);
+    store3(grad_normals + 3 * i, g.normal + load3(grad_directions + 3 * (n + i)) * facing(normal, view));
+    grad_roughness[i] = g.roughness + grad_asked_roughness[i];
   }
 };
 SPLITNERF_ON_GPU(LightQueriesBackwardBody);
@@ -111,11 +79,6 @@ template <class T> struct ShadeBody {
 };
 SPLITNERF_ON_GPU(ShadeBody);
 
-// The gradients of other readers of the same arguments, each [n, 3] or [n], or null.
-template <class T> struct MaterialGradients {
-  const T *normals, *albedo, *roughness, *metallic;
-};
-
 template <class T> struct ShadeBackwardBody {
   const float* lut;
   ShadeOptions options;
@@ -123,7 +86,6 @@ template <class T> struct ShadeBackwardBody {
   ShadeArrays<const T> in;
   const T* grad_radiance;
   ShadeArrays<T> grad;
-  MaterialGradients<T> more = {};
 
   SPLITNERF_HD void operator()(int64_t i) const {
     const ShadePoint<T> g =
@@ -137,32 +99,9 @@ template <class T> struct ShadeBackwardBody {
     store3(grad.diffuse + 3 * i, g.diffuse);
     store_factors(grad.occlusion_s, i, n_channels, g.occlusion_s);
     store_factors(grad.occlusion_d, i, n_channels, g.occlusion_d);
-    add_more(i);
-  }
-  SPLITNERF_HD void add_more(int64_t i) const {
-    store3(grad.normals + 3 * i, load3(grad.normals + 3 * i) + load3_if(more.normals, i));
-    store3(grad.albedo + 3 * i, load3(grad.albedo + 3 * i) + load3_if(more.albedo, i));
-    grad.roughness[i] += load_if(more.roughness, i);
-    grad.metallic[i] += load_if(more.metallic, i);
   }
 };
 SPLITNERF_ON_GPU(ShadeBackwardBody);
-
-// The share of directions that follow the visible normals, for sample_bsdf: within bounds, so that neither lobe is
-// without directions.
-inline constexpr double kMinLobeShare = 0.1, kMaxLobeShare = 0.95;
-template <class T> struct SpecularShareBody {
-  const float* lut;
-  const T *normals, *view_dirs, *albedo, *roughness, *metallic;
-  T* share;
-
-  SPLITNERF_HD void operator()(int64_t i) const {
-    const T nv = std::fabs(dot(load3(normals + 3 * i), load3(view_dirs + 3 * i)));
-    share[i] = clamp(specular_share(sample_brdf_lut(lut, nv, roughness[i]), load3(albedo + 3 * i), metallic[i]),
-                     T(kMinLobeShare), T(kMaxLobeShare));
-  }
-};
-SPLITNERF_ON_GPU(SpecularShareBody);
 
 template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
   return {load3(in.normals + 3 * i), load3(in.view_dirs + 3 * i), load3(in.albedo + 3 * i),

@@ -1,0 +1,367 @@
+"""Every operator on the inputs of op_cases: its reference, its gradients, what torch asks of it, few points, and errors."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import reference
+import torch
+from bench.hash_grid import SPEC
+from op_cases import (
+    CASES,
+    cached_visibility_inputs,
+    check_against_the_cpu,
+    lookup_inputs,
+    pixel_inputs,
+    shared_inputs,
+    sparse_inputs,
+    truth,
+)
+from op_checks import as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
+from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
+from torch.autograd import forward_ad
+from torch.utils.checkpoint import checkpoint
+
+from splitnerf import _core
+from splitnerf.ops import linear_to_srgb
+
+ON_THE_CPU_ALONE = {"occlusion_factors", "incoming_light", "visibility_bits", "vertex_grids"}  # Embree; once a mesh
+WRITES_TO_ARGUMENTS = {"adamw_steps_"}  # has no outputs: see test_ops_adamw.py
+# The inputs to which there is a gradient.
+DIFFERENTIABLE = {
+    "hash_encode": (0, 1), "sdf_field": range(1, 8), "surface_weights": (0, 1, 3), "composite": (0, 1, 3), "interpolate": (0,),
+    "light_queries": (0, 2), "split_sum_shade": range(9), "shade_sums": (*range(6), 8), "monte_carlo_light": (0, 2, 5),
+    "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "prefilter_light": (3,), "sparse_product": (6,),
+    "light_lookup": (0, 1, 2, 3), "pixel_losses": (0, 1), "gradient_losses": (0,), "quadratic_entropy": (0,), "light_prior": (0,),
+}  # fmt: skip
+FORWARD = sorted(name for name in CASES if "_backward" not in name)
+TWICE = {"sparse_product"}  # whose gradient has gradients
+
+
+def smaller(name: str, dtype: torch.dtype, n: int | None = None) -> tuple:
+    """A case for differences; with `n` only so many of its points, where each is worked out by itself."""
+    inputs = indirect_inputs(dtype, 0, 3, 12) if name == "split_sum_shade" else CASES[name](dtype)
+    if name == "surface_weights":
+        inputs[1][5] *= 1e5  # too short a gradient has none
+    if n is None:
+        return inputs
+    most = len(inputs[1] if name == "read_pixels" else inputs[0])
+    return tuple(x[:n] if isinstance(x, torch.Tensor) and x.dim() and len(x) == most else x for x in inputs)
+
+
+def weighted(outputs: Sequence[torch.Tensor]) -> torch.Tensor:
+    """A sum over all results, each number with a weight of its own."""
+    weights = (torch.randn(x.shape, generator=generator(i), dtype=x.dtype) for i, x in enumerate(outputs))
+    return sum((w * x).sum() for w, x in zip(weights, outputs))
+
+
+# ---- the references ----
+
+TOLERANCE = {"cached_occlusion": 2e-7}  # its directions have unit length in float32; of the others: 1e-9
+LOSSES = ("pixel_losses", "gradient_losses")  # whose operators return all terms in one tensor
+
+
+def as_the_operator_reads(inputs: tuple) -> tuple:
+    """Numbers such as a step's length are float32 inside of some operators."""
+    return tuple(float(np.float32(x)) if isinstance(x, float) else x for x in inputs)
+
+
+def results(op: str, inputs: tuple) -> list[torch.Tensor]:
+    got = as_tuple(getattr(lib, op)(*inputs))
+    return list(got[0].unbind()) if op in LOSSES else list(got)
+
+
+def deep_light(dtype: torch.dtype) -> tuple:
+    """Spherical harmonics whose sums fall below 0 in places."""
+    inputs = lookup_inputs(dtype, 300)
+    return (*inputs[:3], inputs[3] * torch.where(torch.arange(169) == 0, 0.1, 3.0)[:, None].to(dtype), *inputs[4:])
+
+
+def far_points(dtype: torch.dtype) -> tuple:
+    """Some lie off the mesh by more than the radius in which vertices count at first, some by more than any."""
+    x, normals, *rest = cached_visibility_inputs(dtype)
+    return x + normals * rest[4] * torch.tensor([0.2, 1.5, 3.0, 5.0, 0.0, 1.2, 2.5, 9.0, 99.0]).to(dtype)[:, None], normals, *rest
+
+
+# Other settings of the same operators: what the first case of each does not reach.
+OTHERS = [
+    *(("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
+      for mode in (0, 1, 2) for gain in (False, True)),
+    ("light_queries", lambda t: query_inputs("cpu", t, False, 300)),
+    ("shade_sums", lambda t: mixed_sums_inputs(300, t, compensate=False)),
+    *(("surface_weights", lambda t, anneal=anneal: (*CASES["surface_weights"](t)[:6], torch.tensor(anneal, dtype=t), 0.3, CASES["surface_weights"](t)[8]))
+      for anneal in (0.0, 1.0)),
+    ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
+    ("light_lookup", deep_light),
+    ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
+    ("cached_visibility", far_points),
+    ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
+]  # fmt: skip
+REFERENCES = sorted({name for name, _ in inspect.getmembers(reference, inspect.isfunction)} & set(CASES))
+
+
+@pytest.mark.parametrize(
+    ("op", "case"), [*((op, CASES[op]) for op in REFERENCES), *OTHERS], ids=lambda x: x if isinstance(x, str) else ""
+)
+def test_operator_and_reference_agree(op, case):
+    wanted = DIFFERENTIABLE.get(op, ())
+    inputs = as_the_operator_reads(truth(case(torch.float64)))
+    ours, theirs = (grad_leaves(inputs, wanted) for _ in range(2))
+    expected = as_tuple(getattr(reference, op)(*theirs))
+    got = results(op, ours)[: len(expected)]
+    for a, b in zip(got, expected, strict=True):
+        torch.testing.assert_close(a, b, rtol=TOLERANCE.get(op, 1e-9), atol=1e-10)
+    if not wanted:
+        return
+    for outputs in (got, expected):
+        weighted(outputs).backward()
+    for i in wanted:
+        torch.testing.assert_close(ours[i].grad, theirs[i].grad, rtol=1e-7, atol=1e-9)
+        assert theirs[i].grad.abs().max() > 0
+
+
+def test_every_differentiable_operator_has_a_reference():
+    assert set(DIFFERENTIABLE) <= set(REFERENCES)
+
+
+def test_the_grid_of_the_benchmark_is_the_operator():
+    """2^19 entries a level: hashes of large coordinates."""
+    x = torch.rand(200, 3, generator=generator(), dtype=torch.float64)
+    table = torch.randn(SPEC.n_entries, SPEC.n_features, generator=generator(1), dtype=torch.float64)
+    inputs = x, table, *SPEC.arguments(SPEC.n_levels)
+    torch.testing.assert_close(reference.hash_encode(*inputs), lib.hash_encode(*inputs), rtol=1e-9, atol=1e-12)
+
+
+# ---- devices and dtypes ----
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=["float32", "float64"])
+@pytest.mark.parametrize(
+    ("op", "device"), [pytest.param(op, *(d.values if hasattr(d, "values") else (d,)), marks=getattr(d, "marks", ()))
+                       for op in CASES for d in devices(op)],
+)  # fmt: skip
+def test_the_results_are_those_of_the_cpu_in_float64(op, device, dtype):
+    if op == "sample_rays" and dtype == torch.float32 and device == "cuda":
+        pytest.skip("the network's roundings decide which samples are kept")
+    check_against_the_cpu(op, dtype, device)
+
+
+def test_every_operator_is_listed():
+    every = {s.name.split("::")[1] for s in torch._C._jit_get_all_schemas() if s.name.startswith("splitnerf::")}
+    assert every == set(CASES) | ON_THE_CPU_ALONE | WRITES_TO_ARGUMENTS
+
+
+@pytest.mark.skipif(not _core.cuda_architectures(), reason="built without CUDA")
+def test_the_build_holds_the_kernels():
+    """Also where no GPU is: the library loads there, and knows what it could run."""
+    assert {op for op in {*CASES, *WRITES_TO_ARGUMENTS} if not has_cuda_kernel(op)} == set()
+    assert {op for op in ON_THE_CPU_ALONE if has_cuda_kernel(op)} == set()
+
+
+# ---- what torch asks ----
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_opcheck(name):
+    check_op(getattr(lib, name), smaller(name, torch.float32), DIFFERENTIABLE.get(name, ()))
+
+
+@pytest.mark.parametrize("name", DIFFERENTIABLE)
+def test_gradcheck(name):
+    op, inputs = getattr(lib, name), grad_leaves(smaller(name, torch.float64), DIFFERENTIABLE[name])
+
+    def smooth(*leaves):  # the second result of the losses has no gradient
+        return tuple(x for x in as_tuple(op(*leaves)) if x.requires_grad)
+
+    torch.autograd.gradcheck(smooth, inputs, eps=1e-7, atol=1e-5, rtol=1e-3, fast_mode=True, nondet_tol=1e-12)
+
+
+def float_positions(inputs: tuple) -> list[int]:
+    return [i for i, x in enumerate(inputs) if isinstance(x, torch.Tensor) and x.is_floating_point()]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_gradient_that_is_not_defined_raises(name):
+    """It is never zeros and never silently absent; so is every second derivative."""
+    inputs = smaller(name, torch.float64)
+    for i in float_positions(inputs):
+        if i in DIFFERENTIABLE.get(name, ()):
+            continue
+        leaves = grad_leaves(inputs, [i])
+        with pytest.raises(RuntimeError, match="gradient|does not require grad"):
+            sum(x.sum() for x in floats(getattr(lib, name)(*leaves))).backward()
+        assert leaves[i].grad is None
+
+
+@pytest.mark.parametrize("name", sorted(set(DIFFERENTIABLE) - TWICE))
+def test_a_second_derivative_raises(name):
+    inputs = grad_leaves(smaller(name, torch.float64), DIFFERENTIABLE[name])
+    leaves = [inputs[i] for i in DIFFERENTIABLE[name]]
+    first = torch.autograd.grad(weighted([x**2 for x in results(name, inputs)]), leaves, create_graph=True)
+    with pytest.raises(RuntimeError, match="no gradient is defined|once_differentiable"):
+        sum(x.sum() for x in first).backward()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_tangent_raises(name):
+    inputs = list(smaller(name, torch.float64))
+    i = float_positions(inputs)[0]
+    with forward_ad.dual_level():
+        inputs[i] = forward_ad.make_dual(inputs[i], torch.ones_like(inputs[i]))
+        with pytest.raises(RuntimeError, match="no forward derivative"):
+            getattr(lib, name)(*inputs)
+
+
+def test_activations_may_be_computed_again():
+    """What torch's checkpointing does in the backward pass."""
+    x = torch.rand(5, requires_grad=True)
+    again = checkpoint(lambda y: linear_to_srgb(torch.sin(y) * 0.5 + 0.2), x, use_reentrant=False)
+    (gradient,) = torch.autograd.grad(again.sum(), x)
+    (expected,) = torch.autograd.grad(linear_to_srgb(torch.sin(x) * 0.5 + 0.2).sum(), x)
+    assert torch.equal(gradient, expected)
+
+
+def test_compilation_in_a_new_process():
+    """Of an operator that nobody called before."""
+    code = """
+import torch
+from splitnerf.ops import linear_to_srgb
+f = torch.compile(lambda x: linear_to_srgb(x) + 1, fullgraph=True, backend="aot_eager")
+x = torch.rand(5, requires_grad=True)
+f(x).sum().backward()
+assert x.grad is not None
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=100)
+
+
+# ---- few points ----
+
+# Operators whose results at a point depend on nothing else of the call.
+BY_POINT = (
+    "hash_encode", "sdf_field", "sdf_values", "split_sum_shade", "prefilter_light", "sample_ggx_lobe", "light_lookup", "monte_carlo_light",
+    "summed_light", "shade_sums", "linear_to_srgb", "srgb_to_linear", "read_pixels", "cached_occlusion", "cached_visibility",
+)  # fmt: skip
+NONE_3, NONE, LONG = torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, dtype=torch.int64)
+CELLS = torch.ones(4, 4, 4, dtype=torch.uint8)
+# The others without a point, or without a sample on two rays.
+EMPTY = {
+    "light_queries": lambda t: query_inputs("cpu", t, True, 0),
+    "march_rays": lambda t: (NONE_3, NONE_3, NONE, CELLS, 1.5, 0.1, 64),
+    "sample_rays": lambda t: (NONE_3, NONE_3, NONE, *CASES["sample_rays"](torch.float32)[3:]),
+    "draw_rays": lambda t: (NONE, 0, *CASES["draw_rays"](torch.float32)[2:]),
+    "surface_weights": lambda t: (
+        NONE, NONE_3, torch.eye(3)[:2], torch.tensor(9.0), torch.zeros(3, dtype=torch.int64), *torch.tensor([0.1, 1.0]), 0.0, -1
+    ),
+    "composite": lambda t: (NONE, NONE_3, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 0.1),
+    "spread_samples": lambda t: (NONE, NONE, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 1.0, 2),
+    "interpolate": lambda t: (torch.ones(2, 3), LONG, LONG, NONE),
+    "pixel_losses": lambda t: (NONE_3, NONE, torch.zeros(0, 4), NONE_3, None, None, True),
+    "gradient_losses": lambda t: (NONE_3, NONE, LONG),
+}  # fmt: skip
+ALWAYS_SOME = {"sparse_product", "quadratic_entropy", "light_prior"}  # refuse to be asked about nothing
+
+
+@pytest.mark.parametrize("name", BY_POINT)
+def test_one_point_alone_is_that_point_among_others_and_none_is_none(name):
+    inputs = smaller(name, torch.float64)
+    among, alone, none = (as_tuple(getattr(lib, name)(*x)) for x in (inputs, smaller(name, torch.float64, 1), smaller(name, torch.float64, 0)))
+    for many, one, nothing in zip(among, alone, none, strict=True):
+        torch.testing.assert_close(one, many[: len(one)], rtol=1e-12, atol=1e-12)
+        assert len(one) == min(1, len(many)) and nothing.shape == (0, *many.shape[1:])
+
+
+@pytest.mark.parametrize("name", [*EMPTY, *(name for name in BY_POINT if name in DIFFERENTIABLE)])
+def test_nothing_gives_gradients_of_nothing(name):
+    inputs = EMPTY[name](torch.float32) if name in EMPTY else smaller(name, torch.float32, 0)
+    inputs = grad_leaves(inputs, [i for i in DIFFERENTIABLE.get(name, ()) if inputs[i] is not None])
+    found = floats(getattr(lib, name)(*inputs))
+    assert all(not x.any() for x in found)
+    if name in DIFFERENTIABLE:
+        sum(x.sum() for x in found).backward()
+        assert all(not inputs[i].grad.any() for i in DIFFERENTIABLE[name] if inputs[i] is not None)
+
+
+def test_every_operator_is_asked_about_nothing():
+    assert set(FORWARD) == {*BY_POINT, *EMPTY} | ALWAYS_SOME
+
+
+# ---- errors ----
+
+
+def arguments_of(name: str) -> list[str]:
+    return [argument.name for argument in getattr(lib, name).default._schema.arguments]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_tensor_of_another_shape_or_dtype_is_named(name):
+    """With one more dimension, or of a dtype that no operator takes: operator and argument stand in the message."""
+    inputs, unread = CASES[name](torch.float32), {"interpolate_backward": ("shaded",)}.get(name, ())
+    for i, (argument, x) in enumerate(zip(arguments_of(name), inputs)):
+        if not isinstance(x, torch.Tensor) or argument in unread:
+            continue
+        any_shape = name.startswith(("linear_to_srgb", "srgb_to_linear"))
+        for wrong in ([] if any_shape else [x[None, None]]) + [x.to(torch.complex64)]:
+            changed = (*inputs[:i], wrong, *inputs[i + 1 :])
+            with pytest.raises(ValueError, match=name) as error:
+                getattr(lib, name)(*changed)
+            assert argument in str(error.value), f"{argument} is missing in {error.value}"
+
+
+def without(x: torch.Tensor, rows: int = 1) -> torch.Tensor:
+    return x[: len(x) - rows]
+
+
+# An operator, the position of an argument, what takes its place, and words of the message.
+ERRORS = [
+    ("hash_encode", 1, without, "table must be"),
+    ("hash_encode", 2, lambda n: 33, "n_levels must be in [1, 32], got 33"),
+    ("hash_encode", 3, lambda n: 0, "base_resolution must be at least 1, got 0"),
+    ("hash_encode", 4, lambda n: 0.5, "growth must be at least 1, got 0.5"),
+    ("hash_encode", 5, lambda n: 31, "log2_table_size must be in [1, 30], got 31"),
+    ("hash_encode", 6, lambda n: 4, "n_active must be in [0, n_levels], got 4"),
+    ("sdf_field", 3, without, "hidden_length must be"),
+    ("sdf_field", 8, lambda beta: 0.0, "beta and box must be positive"),
+    ("sdf_field", 13, lambda n: 4, "n_active must be in [0, n_levels], got 4"),
+    ("march_rays", 4, lambda box: -1.0, "box"),
+    ("march_rays", 5, lambda step: 0.0, "step"),
+    ("surface_weights", 4, lambda offsets: offsets + 1, "offsets must rise from 0"),
+    ("surface_weights", 4, lambda offsets: offsets[:0], "offsets must be"),
+    ("surface_weights", 4, lambda offsets: offsets.flip(0), "offsets must rise from 0"),
+    ("surface_weights", 5, lambda step: 0 * step, "step must be positive"),
+    ("surface_weights", 8, lambda n: n + 71, "n_samples must be at most the number of points"),
+    ("composite", 2, lambda offsets: offsets + 1, "offsets must rise from 0"),
+    ("composite", 4, lambda least: 0.0, "least_opacity must be positive"),
+    ("spread_samples", 3, lambda phase: phase + 1, "phase must be in [0, 1)"),
+    ("spread_samples", 4, lambda gap: 0.0, "gap must be positive"),
+    ("spread_samples", 5, lambda n: -1, "per_ray must be in [0, 2^20)"),
+    ("interpolate", 1, lambda first: first + 9, "first must be in [0, 5)"),
+    ("interpolate", 2, lambda second: second - 9, "second must be in [0, 5)"),
+    ("split_sum_shade", 6, lambda diffuse: None, "specular must be [600, 3] float32"),
+    ("split_sum_shade", 10, lambda mode: 3, "fresnel_mode must be 0 (exact), 1 (paper) or 2 (code), got 3"),
+    ("light_queries", 3, lambda lut: lut[1:], "lut must be [32, 32, 4]"),
+    ("shade_sums", 9, lambda share: None, "both or neither"),
+    ("summed_light", 7, without, "sent must hold as many points as normals, or none"),
+    ("gradient_losses", 2, lambda beside: beside + 15, "beside must hold indices of weights"),
+    ("gradient_losses", 0, lambda g: g[:25], "samples and their neighbours"),
+    ("pixel_losses", 3, without, "background must be [600, 3]"),
+    ("pixel_losses_backward", 7, without, "grad_losses must be [2]"),
+    ("quadratic_entropy", 0, lambda x: x[:0], "x must hold at least one point"),
+    ("light_prior", 1, lambda sizes: [], "level_sizes must hold 1 to 16 numbers"),
+    ("light_prior", 1, lambda sizes: [1] * 17, "level_sizes must hold 1 to 16 numbers"),
+    ("light_prior", 1, lambda sizes: [336, 0], "level_sizes must be positive"),
+    ("light_prior", 1, lambda sizes: [3, 4], "level_sizes must sum to the number of texels"),
+]
+
+
+@pytest.mark.parametrize(("name", "position", "change", "words"), ERRORS)
+def test_what_does_not_fit_is_named(name, position, change, words):
+    inputs = list(CASES[name](torch.float32))
+    inputs[position] = change(inputs[position])
+    with pytest.raises(ValueError, match=name) as error:
+        getattr(lib, name)(*inputs)
+    assert words in str(error.value)
