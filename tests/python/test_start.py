@@ -48,9 +48,12 @@ def texture(points: np.ndarray, frequency: float = 18.0) -> np.ndarray:
     return 0.5 + 0.5 * np.tanh(np.sin(points @ waves.T + np.arange(12)).sum(1) / 2.5)
 
 
-def photographed(n: int, size: int, frequency: float) -> tuple[stereo.GreyPhotos, torch.Tensor]:
-    """n photos of the box, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside the box."""
-    mesh, poses = open_box(), torch.from_numpy(spiral(n, 3.0, (20, 80))).float()
+def photographed(
+    n: int, size: int, frequency: float, mesh: trimesh.Trimesh | None = None
+) -> tuple[stereo.GreyPhotos, torch.Tensor]:
+    """n photos of the box or another mesh, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside it."""
+    mesh = open_box() if mesh is None else mesh
+    poses = torch.from_numpy(spiral(n, 3.0, (20, 80))).float()
     focal = 0.5 * size / math.tan(0.35)
     lens = torch.tensor([focal, focal, size / 2, size / 2])
     grey, depths = np.zeros((n, size * size), np.float32), np.zeros((n, size * size), np.float32)
@@ -111,12 +114,21 @@ def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
 
     monkeypatch.setattr(start, "grey_photos", sized)
     monkeypatch.setattr(start, "FINE_PASSES", start.FINE_PASSES[-1:])
+    monkeypatch.setattr(start, "FULL_FINE", 0.7)  # this box has thick walls
     shape = start.start_shape(SimpleNamespace(height=300, width=size), hull(), preset("cpu"))
     if size < 200:
         assert shape is None
         return
     places = torch.tensor([[0.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.0, 0.0, -0.3], [0.0, 0.0, -0.5], [0.5, 0.0, 0.0]])
     assert (shape.at(places) > 0).tolist() == [True, True, True, False, False]
+
+
+def test_a_solid_object_begins_with_a_sphere_however_clear_its_depths(monkeypatch):
+    block = trimesh.creation.box(bounds=[[-0.6] * 3, [0.6] * 3])
+    photos = photographed(24, 50, 18.0, block)[0]
+    assert (stereo.depth_maps(photos, hull(), BOX)[2] > MARGIN).sum() > CLEAR_SHARE * photos.masks.sum()
+    monkeypatch.setattr(start, "grey_photos", lambda *_: photos)
+    assert start.start_shape(SimpleNamespace(height=50, width=50), hull(), preset("cpu")) is None
 
 
 def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found):

@@ -36,6 +36,7 @@ POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
 CLEAR_SHARE, CLEAR_SHARE_FINE = 0.25, 0.4  # of the object's pixels that must be clear; finer windows are clear by chance, too
+FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing, and a sphere does as well or better
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
 # Edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells.
@@ -96,12 +97,14 @@ def read(grid: Tensor, box: float, positions: Tensor) -> Tensor:
 
 
 def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | None:
-    """The shape that photos suggest, inside of their visual hull; None where most of their pixels fit at many depths.
+    """The shape that photos suggest, inside of their visual hull; None where it fills the hull, or most pixels fit at many
+    depths.
 
     First the depths of all pixels are compared, then those next to the surface that they make, more and more finely:
     there the windows follow the surface. Where small photos show no clear depths, large ones are asked, a few at first:
     the grain of clay shows near their own size alone. Objects without texture fit at all depths, and on glossy ones
-    reflections look like surfaces behind the object: both begin with a sphere, in which shading and outlines carve.
+    reflections look like surfaces behind the object: both begin with a sphere, in which shading and outlines carve. So do
+    objects that fill most of their hull.
 
     Args:
         photos: The photos of the training.
@@ -120,10 +123,10 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     def is_clear(margins: Tensor, most: int, edge: int, share: float) -> bool:
         return bool((margins > MARGIN).sum() > share * photos_of(edge).spread(most).masks.sum())
 
-    edge, most, passes = FIRST_EDGE, MOST_VIEWS, PASSES
+    edge, most, passes, full = FIRST_EDGE, MOST_VIEWS, PASSES, FULL
     depths, scores, margins = depth_maps(photos_of(edge), hull, box)
     if not is_clear(margins, most, edge, CLEAR_SHARE):
-        edge, most, passes = FINE_EDGE, FINE_VIEWS, FINE_PASSES
+        edge, most, passes, full = FINE_EDGE, FINE_VIEWS, FINE_PASSES, FULL_FINE
         if min(photos.height, photos.width) < 2 * EDGE:
             return None
         margins = depth_maps(photos_of(edge), hull, box, FINE_PROBES)[2]
@@ -133,6 +136,8 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
     spread = photos_of(edge).spread(most)
     solid = blurred(fused_distances(spread, depths, weights, hull, box, FIRST_TRUNCATION)[0], FIRST_BLUR)
+    if (solid < 0).sum() > full * hull.sum():
+        return None
     try:
         for edge, reach, step, truncation, blur in passes:
             grey = photos_of(edge)
