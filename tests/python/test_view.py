@@ -28,7 +28,7 @@ from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
 from splitnerf_tools.view.assets import MOST_DROPPED, ViewedAssets
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.photos import Photos
+from splitnerf_tools.view.photos import ViewedPhotos
 from splitnerf_tools.view.server import ViewServer
 import splitnerf_tools.view
 
@@ -174,7 +174,7 @@ def test_a_light_of_many_rows_is_made_smaller(shown_run, tmp_path, monkeypatch):
 
 
 def test_photos_are_served_with_their_cameras(shown_run, data):
-    with serving(shown_run, photos=Photos(data)) as server:
+    with serving(shown_run, photos=ViewedPhotos(data)) as server:
         cameras = json.loads(ask(server, "scene.json")[2])["cameras"]
         frames = read_frames(data, "train", Reading(eval_mode="all"))[0]
         assert len(frames) == 8
@@ -189,7 +189,7 @@ def test_photos_are_served_with_their_cameras(shown_run, data):
 
 def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, tmp_path, monkeypatch):
     monkeypatch.setattr("splitnerf_tools.view.photos.LARGEST", 10)
-    with serving(shown_run, photos=Photos(data)) as server:
+    with serving(shown_run, photos=ViewedPhotos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
     for path in (tmp_path / "data").rglob("transforms*.json"):
@@ -201,17 +201,17 @@ def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, 
     photo = read_frames(tmp_path / "data", "train")[0][0].image_path
     write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
     monkeypatch.undo()
-    with serving(shown_run, photos=Photos(tmp_path / "data")) as server:
+    with serving(shown_run, photos=ViewedPhotos(tmp_path / "data")) as server:
         assert (decode_image(ask(server, "photos/0")[2], "photo")[..., 3] == 1).all()
 
 
 def test_a_photo_that_is_gone_is_said(shown_run, data, tmp_path):
     shutil.copytree(data, tmp_path / "data")
-    photos = Photos(tmp_path / "data")
+    photos = ViewedPhotos(tmp_path / "data")
     with serving(shown_run, photos=photos) as server:
         shutil.rmtree(tmp_path / "data")
         status, line = error_of(ask(server, "photos/0"))
-        assert status == 422 and "r_000.png: cannot be read (No such file" in line
+        assert status == 422 and "r_000.png: no such image; check the path" in line
     with serving(shown_run) as server:
         assert json.loads(ask(server, "scene.json")[2])["cameras"] == [] and ask(server, "photos/0")[0] == 404
 

@@ -20,7 +20,7 @@ from splitnerf.export.glb import write_glb
 from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.view.assets import ViewedAssets
-from splitnerf_tools.view.photos import Photos
+from splitnerf_tools.view.photos import ViewedPhotos
 from splitnerf_tools.view.server import ViewServer
 
 SIZE = 160
@@ -115,7 +115,7 @@ def photos(run):
         frames.append({"file_path": f"{i}.png", "transform_matrix": pose.tolist()})
     intrinsics = dict(zip(("fl_x", "fl_y", "cx", "cy"), lens)) | {"w": SIZE, "h": 120}
     (folder / "transforms.json").write_text(json.dumps(intrinsics | {"frames": frames}))
-    return Photos(folder)
+    return ViewedPhotos(folder)
 
 
 @pytest.fixture(scope="module")

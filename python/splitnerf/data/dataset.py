@@ -280,13 +280,6 @@ def spread(items: Sequence, count: int) -> list:
     return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
 
 
-def stack_known(known: Sequence[np.ndarray | None], shape: tuple[int, int]) -> np.ndarray | None:
-    """[n, H, W] of known pixels [H, W] of this shape, each None where all are known; None where all are None."""
-    if all(one is None for one in known):
-        return None
-    return np.stack([np.ones(shape, bool) if one is None else one for one in known])
-
-
 class _Contradiction(InputError):
     """Masks of the object that cannot be of one object, seen from these poses."""
 
@@ -300,12 +293,11 @@ def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Phot
     """
     frames, kind = loader.frames, "ignore" if reading.mask_kind == "ignore" else "object"
     photos = loader.load(kind)
-    if not _has_masks(photos):
-        return photos, _box_of_views(root, frames, photos), kind
+    masked = _has_masks(photos)
     pairs = zip(spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS))
     masks = [_kept(photo) for frame, photo in pairs if frame.mask_path is not None and frame.mask_kind == "auto"]
-    if reading.mask_kind != "auto" or not masks:
-        return photos, _estimate_box(root, frames, photos), kind
+    if reading.mask_kind != "auto" or not (masks and masked):
+        return photos, _estimate_box(root, frames, photos, masked), kind
     kept, edge = np.median(masks, axis=0)
     ignoring = (
         f"{root}: its mask files are taken to ignore what is black, as {{}}; --mask-kind object if white is the object"
@@ -329,19 +321,21 @@ def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Phot
     return photos, box_from_world, "object"
 
 
-def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo]) -> np.ndarray:
-    """The similarity to the internal frame, from a part of the train split."""
-    _check_masks(frames, photos)
-    frames, photos = spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS)
-    height, width = photos[0].size
-    factor = silhouette_factor(height, width)
+def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo], masked: bool = True) -> np.ndarray:
+    """The similarity to the internal frame from a part of the train split: by masks or, without, by what all cameras look at."""
+    if masked:
+        _check_masks(frames, photos)
+        frames, photos = spread(frames, HULL_VIEWS), spread(photos, HULL_VIEWS)
+    poses = np.stack([frame.pose for frame in frames])
+    intrinsics = np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)])
     try:
-        return estimate_box(
-            np.stack([photo.silhouette for photo in photos]),
-            np.stack([frame.pose for frame in frames]),
-            np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)]) / factor,
-            stack_known([photo.seen for photo in photos], photos[0].silhouette.shape),
-        )
+        if not masked:
+            return box_of_views(poses, intrinsics, np.array([photo.size for photo in photos]))
+        silhouettes, seen = np.stack([photo.silhouette for photo in photos]), [photo.seen for photo in photos]
+        known = None
+        if any(one is not None for one in seen):
+            known = np.stack([np.ones(silhouettes.shape[1:], bool) if one is None else one for one in seen])
+        return estimate_box(silhouettes, poses, intrinsics / silhouette_factor(*photos[0].size), known)
     except MasksContradict as error:
         names = [frames[i].image_path.name for i in error.views]
         where = f" (those of {', '.join(names[:5])} and the others)" if names else ""
@@ -350,26 +344,10 @@ def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo]) -> np.nd
         raise InputError(f"{root}: {error}") from None
 
 
-def _box_of_views(root: Path, frames: list[Frame], photos: list[Photo]) -> np.ndarray:
-    """The similarity to the internal frame of what all cameras look at."""
-    sizes = [photo.size for photo in photos]
-    try:
-        return box_of_views(
-            np.stack([frame.pose for frame in frames]),
-            np.stack([lens_intrinsics(frame.lens, size) for frame, size in zip(frames, sizes)]),
-            np.array(sizes),
-        )
-    except ValueError as error:
-        raise InputError(f"{root}: {error}") from None
-
-
 def _has_masks(photos: list[Photo]) -> bool:
     """Whether photos say where the object is; a mask that is full everywhere says nothing."""
-    return any(photo.masked for photo in photos) and not all(_is_full(photo) for photo in photos)
-
-
-def _is_full(photo: Photo) -> bool:
-    return bool((photo.silhouette if photo.seen is None else photo.silhouette | ~photo.seen).all())
+    full = ((photo.silhouette if photo.seen is None else photo.silhouette | ~photo.seen).all() for photo in photos)
+    return any(photo.masked for photo in photos) and not all(full)
 
 
 def _kept(photo: Photo) -> tuple[float, float]:

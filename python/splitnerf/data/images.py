@@ -46,16 +46,12 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
     Raises:
         InputError: The file is missing, unreadable, truncated, of another format, or claims a size beyond reason.
     """
-    path = Path(path)
-    if not is_file(path):
-        raise InputError(f"{path}: no such image; check the path")
-    return _read(path, str(path))
+    return _read(Path(path), str(path))
 
 
 def read_codes(path: str | os.PathLike) -> np.ndarray:
     """Reads an image like `read_image`, but the values of 8- and 16-bit files as they are stored: uint8 or uint16."""
-    path = Path(path)
-    return _read(path, str(path), as_stored=True)
+    return _read(Path(path), str(path), as_stored=True)
 
 
 class Header(NamedTuple):
@@ -69,10 +65,7 @@ class Header(NamedTuple):
 
 def read_header(path: str | os.PathLike) -> Header:
     """What an image file says of itself, without its pixels. Raises InputError as `read_image` does."""
-    path = Path(path)
-    if not is_file(path):
-        raise InputError(f"{path}: no such image; check the path")
-    with _opened(path, str(path)) as (_, spec):
+    with _opened(Path(path), str(path)) as (_, spec):
         return Header(spec.height, spec.width, spec.nchannels, STORED.get(str(spec.format), 32))
 
 
@@ -248,6 +241,8 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
 @contextmanager
 def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
     """An image file with its header read, whose size is no more than its bytes and the memory allow."""
+    if not is_file(path):
+        raise InputError(f"{name}: no such image; check the path")
     try:
         str(path).encode()
     except UnicodeEncodeError:  # a name that is not UTF-8, which OpenImageIO does not open

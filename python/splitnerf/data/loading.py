@@ -46,8 +46,10 @@ class Loader:
         self.frames, self.downscale, self.separated = frames, downscale, reading.separated
         (height, width), exact = check_files(frames, downscale)
         shape = (len(frames), height // downscale, width // downscale)
-        kind, hides = np.dtype(np.uint8 if exact else np.uint16), any(map(_may_hide, frames))
-        work = height * width * (WORK_BENT if any(map(_needs_floats, frames)) else WORK)
+        kind, bent = np.dtype(np.uint8 if exact else np.uint16), any(frame.distortion is not None for frame in frames)
+        hides = bent or any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
+        floats = bent or any(f.gamma != 0 or f.image_path.suffix.lower() in HDR_SUFFIXES for f in frames)
+        work = height * width * (WORK_BENT if floats else WORK)
         size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
         room = room_for_photos(reading.max_memory)
         in_file = size + work > room
@@ -100,14 +102,3 @@ class Loader:
         if self._known is not None and photo.known is not None:
             self._known[i] = photo.known
         return replace(photo, rgba=None, known=None)
-
-
-def _needs_floats(frame: Frame) -> bool:
-    """Whether a photo is turned into floats while it is read."""
-    return frame.distortion is not None or frame.gamma != 0 or frame.image_path.suffix.lower() in HDR_SUFFIXES
-
-
-def _may_hide(frame: Frame) -> bool:
-    """Whether some of a frame's pixels may say nothing."""
-    ignored = frame.mask_path is not None and frame.mask_kind != "object"
-    return ignored or frame.dynamic_mask_path is not None or frame.distortion is not None

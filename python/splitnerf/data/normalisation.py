@@ -65,10 +65,7 @@ def estimate_box(
         centre, half = (low + high) / 2, (high - low) / 2 + cell
     if FITS_RADIUS[0] < np.linalg.norm(points, axis=1).max() <= FITS_RADIUS[1]:
         return np.eye(4)
-    radius = np.linalg.norm(points - centre, axis=1).max() + cell / 2
-    box_from_world = np.diag([TARGET_RADIUS / radius] * 3 + [1.0])
-    box_from_world[:3, 3] = -centre * TARGET_RADIUS / radius
-    return box_from_world
+    return _similarity(centre, np.linalg.norm(points - centre, axis=1).max() + cell / 2)
 
 
 def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -90,10 +87,14 @@ def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -
     centre = nearest_to_rays(poses[:, :3, 3], poses[:, :3, 2])
     distances = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
     half = 0.5 * (sizes[:, ::-1] / intrinsics[:, :2]).min(axis=1)  # tangent of half the narrower angle
-    radius = IN_VIEW * np.median(distances * half)
-    box_from_world = np.diag([TARGET_RADIUS / radius] * 3 + [1.0])
-    box_from_world[:3, 3] = -centre * TARGET_RADIUS / radius
-    return box_from_world
+    return _similarity(centre, IN_VIEW * np.median(distances * half))
+
+
+def _similarity(centre: np.ndarray, radius: float) -> np.ndarray:
+    """[4, 4] that brings a ball to the origin, with a radius of TARGET_RADIUS."""
+    matrix = np.diag([TARGET_RADIUS / radius] * 3 + [1.0])
+    matrix[:3, 3] = -centre * TARGET_RADIUS / radius
+    return matrix
 
 
 def _check_places(poses: np.ndarray) -> None:

@@ -198,17 +198,12 @@ def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
     return np.maximum(pixels, 0)
 
 
-def _read_pixels(path: Path) -> np.ndarray:
-    """An image as it is stored, whose values lie in [0, 1] if they are floats. Raises InputError where they do not."""
+def _read_mask(path: Path) -> np.ndarray:
+    """[H, W, 1] as it is stored; in [0, 1] if it holds floats. Raises InputError where they are not."""
     pixels = read_codes(path)
     if pixels.dtype.kind == "f" and not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
         raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
-    return pixels
-
-
-def _read_mask(path: Path) -> np.ndarray:
-    """[H, W, 1] as it is stored."""
-    return _read_pixels(path)[..., :1]
+    return pixels[..., :1]
 
 
 def _undistort(

@@ -20,6 +20,7 @@ from splitnerf.memory import SHARE_OF_PHOTOS, memory_bytes
 
 GB = 10**9
 READ_AHEAD = 1 << 17  # bytes that Linux reads at one request, by default; it takes no more of a longer one
+CURE = "give a larger --downscale or --max-memory, or set TMPDIR to a folder on a larger disk"
 _in_memory: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()  # the arrays of all photos that are there
 
 
@@ -164,7 +165,9 @@ def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndar
         _in_memory[id(array)] = array
         return array
     size, folder = int(np.prod(shape)) * np.dtype(dtype).itemsize, folder_of_files()
-    check_disk(size)
+    free = shutil.disk_usage(folder).free
+    if free < size:
+        raise InputError(f"{folder}: has {free / GB:.1f} GB free, and photos would take {size / GB:.1f} GB; {CURE}")
     with tempfile.TemporaryFile(dir=folder) as file:
         try:
             if hasattr(os, "posix_fallocate"):  # else a disk that others fill ends the program without a word
@@ -176,17 +179,6 @@ def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndar
         mapped = mmap.mmap(file.fileno(), size)
     mapped.madvise(mmap.MADV_RANDOM)  # pixels are drawn one by one: reading ahead would read a hundred times as much
     return np.frombuffer(mapped, dtype).reshape(shape)
-
-
-CURE = "give a larger --downscale or --max-memory, or set TMPDIR to a folder on a larger disk"
-
-
-def check_disk(size: int) -> None:
-    """Raises InputError where the disk of photos' files has not as many bytes."""
-    folder = folder_of_files()
-    free = shutil.disk_usage(folder).free
-    if free < size:
-        raise InputError(f"{folder}: has {free / GB:.1f} GB free, and photos would take {size / GB:.1f} GB; {CURE}")
 
 
 def folder_of_files() -> Path:

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note
 from splitnerf_tools.capture.photographs import read_upright
-from splitnerf_tools.capture.poses import FLIP
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
 from splitnerf_tools.separation.separate import find_object, table_under
@@ -45,7 +45,7 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
     field = train_field(photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share))
     points = surface_points(field, photos)
     table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else table_under(points, photos, seed)
-    region, _ = find_object(field, photos, table, points)
+    region = find_object(field, photos, table, points)
     masks = []
     for i in range(len(photos)):
         masks.append(find_mask(field, region, photos, i))
@@ -84,7 +84,7 @@ def dots_of(world: World, i: int, max_size: int) -> tuple[np.ndarray, np.ndarray
     """[k, 2] where the undistorted photo `i` shows the points that it sees, in pixels: those of the object, and the others."""
     scene = world.scene
     seen = scene.point_of[scene.photo_of == i]
-    camera = np.linalg.inv(scene.poses[i] @ FLIP)
+    camera = np.linalg.inv(scene.poses[i] @ OPENCV_AXES)
     local = transform_points(camera, scene.points[seen]) @ pinhole_of(scene.lenses[i], max_size).matrix.T
     places = local[:, :2] / np.maximum(local[:, 2:], 1e-9)
     of_object = world.object_points[seen]

@@ -6,12 +6,13 @@ import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
+from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.errors import InputError
 from splitnerf_tools.capture.photographs import Photograph
 
@@ -26,7 +27,6 @@ MAX_ERROR, SHORTEST = 2.0, 3  # pixels of reprojection and photos of a point bey
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # between OpenCV's and OpenGL's camera axes
 
 
 @dataclass
@@ -60,6 +60,11 @@ class Lens:
         """[4] float64, k1 k2 p1 p2."""
         return np.array([self.k1, self.k2, self.p1, self.p2])
 
+    def resized(self, width: int, height: int) -> Lens:
+        """The same lens on photos of another size."""
+        x, y = width / self.width, height / self.height
+        return replace(self, width=width, height=height, fx=self.fx * x, fy=self.fy * y, cx=self.cx * x, cy=self.cy * y)
+
 
 @dataclass
 class Reconstruction:
@@ -85,11 +90,6 @@ class Reconstruction:
     observed: np.ndarray
     error: float
     n_models: int
-
-    def camera_points(self, photo: int, points: np.ndarray) -> np.ndarray:
-        """[m, 3] points [m, 3] in OpenCV's axes of a photo's camera."""
-        camera = np.linalg.inv(self.poses[photo] @ FLIP)
-        return points @ camera[:3, :3].T + camera[:3, 3]
 
 
 def reconstruct(
@@ -182,7 +182,7 @@ def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
     poses, lenses, photo_of, point_of, observed = [], [], [], [], []
     for i, image in enumerate(images):
         world_to_camera = np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]])
-        poses.append(np.linalg.inv(world_to_camera) @ FLIP)
+        poses.append(np.linalg.inv(world_to_camera) @ OPENCV_AXES)
         lenses.append(Lens(image.camera.width, image.camera.height, *map(float, image.camera.params)))
         for index in image.get_observation_point2D_idxs():
             point = image.points2D[index]

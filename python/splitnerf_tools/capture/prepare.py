@@ -15,6 +15,7 @@ from PIL import Image
 
 from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
+from splitnerf.data.json_files import write_json
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, locked, remove_partial
 from splitnerf.notes import note
@@ -250,5 +251,4 @@ def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], 
             "exposure": float(exposures.gains[i]), "transform_matrix": world.scene.poses[i].tolist(),
         })  # fmt: skip
     content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
-    with atomic_path(out / TRANSFORMS) as temporary:
-        temporary.write_text(json.dumps(content, indent=1))
+    write_json(out / TRANSFORMS, content)

@@ -15,7 +15,8 @@ from scipy.ndimage import binary_dilation
 
 from splitnerf.data.environment import texels_of_directions
 from splitnerf.data.images import srgb_to_linear
-from splitnerf_tools.capture.poses import FLIP, Lens
+from splitnerf.data.layouts.frame import OPENCV_AXES
+from splitnerf_tools.capture.poses import Lens
 
 HEIGHT = 64  # rows of the map
 HALO = 0.01  # width around the object that is left out, in the photo's width
@@ -80,7 +81,7 @@ def _seen(shot: Shot, centre: np.ndarray, table_radius: float) -> tuple[np.ndarr
     y, x = (part[beside[::STRIDE, ::STRIDE]] for part in np.mgrid[0:h:STRIDE, 0:w:STRIDE])
     lens = shot.lens
     local = np.stack([(x + 0.5 - lens.cx) / lens.fx, (y + 0.5 - lens.cy) / lens.fy, np.ones(len(x))], axis=1)
-    rays = local @ (shot.pose @ FLIP)[:3, :3].T
+    rays = local @ (shot.pose @ OPENCV_AXES)[:3, :3].T
     at = lambda origin: origin - (origin[2] / np.where(rays[:, 2] < 0, rays[:, 2], -1e-9))[:, None] * rays  # noqa: E731
     meets = lambda points: (rays[:, 2] < 0) & (np.linalg.norm(points[:, :2], axis=1) < table_radius)  # noqa: E731
     points = at(shot.pose[:3, 3])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf_tools.capture.poses import Lens
 
+HALF_PIXEL = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # OpenCV's pixel centres are whole numbers
 LEAST_LIGHT = 0.2  # of a corner, in the middle's
 
 
@@ -21,15 +20,10 @@ def pinhole_of(lens: Lens, max_size: int) -> Lens:
         max_size: The longest edge in pixels; 0 keeps the photo's.
     """
     size = (lens.width, lens.height)
-    centred = lens.matrix - np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # OpenCV's pixel centres are whole numbers
-    covered, _ = cv2.getOptimalNewCameraMatrix(centred, lens.distortion, size, 0)
+    covered, _ = cv2.getOptimalNewCameraMatrix(lens.matrix - HALF_PIXEL, lens.distortion, size, 0)
+    fx, fy, cx, cy = map(float, (covered[0, 0], covered[1, 1], covered[0, 2] + 0.5, covered[1, 2] + 0.5))
     scale = min(1.0, max_size / max(size)) if max_size else 1.0
-    width, height = (max(1, round(edge * scale)) for edge in size)
-    sx, sy = width / size[0], height / size[1]
-    return Lens(
-        width, height, float(covered[0, 0] * sx), float(covered[1, 1] * sy),
-        float((covered[0, 2] + 0.5) * sx), float((covered[1, 2] + 0.5) * sy), 0.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+    return Lens(*size, fx, fy, cx, cy, 0.0, 0.0, 0.0, 0.0).resized(*(max(1, round(edge * scale)) for edge in size))
 
 
 def without_vignetting(photo: np.ndarray, lens: Lens, vignetting: tuple[float, float]) -> np.ndarray:
@@ -52,11 +46,8 @@ def without_vignetting(photo: np.ndarray, lens: Lens, vignetting: tuple[float, f
 def undistort(photo: np.ndarray, lens: Lens, pinhole: Lens) -> np.ndarray:
     """A photo [H, W, c] of `lens` as `pinhole` sees it, [h, w, c] of the same type."""
     size = (lens.width, lens.height)
-    full = replace(pinhole, width=size[0], height=size[1], fx=pinhole.fx * size[0] / pinhole.width,
-                   fy=pinhole.fy * size[1] / pinhole.height, cx=pinhole.cx * size[0] / pinhole.width,
-                   cy=pinhole.cy * size[1] / pinhole.height)  # fmt: skip
-    half = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
-    maps = cv2.initUndistortRectifyMap(lens.matrix - half, lens.distortion, None, full.matrix - half, size, cv2.CV_32FC1)
+    old, new = lens.matrix - HALF_PIXEL, pinhole.resized(*size).matrix - HALF_PIXEL
+    maps = cv2.initUndistortRectifyMap(old, lens.distortion, None, new, size, cv2.CV_32FC1)
     image = cv2.remap(photo, *maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     if (pinhole.width, pinhole.height) != size:
         image = cv2.resize(image, (pinhole.width, pinhole.height), interpolation=cv2.INTER_AREA)

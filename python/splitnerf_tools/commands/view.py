@@ -36,14 +36,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf_tools.view.photos import Photos
+    from splitnerf_tools.view.photos import ViewedPhotos
     from splitnerf_tools.view.server import ViewServer
     from splitnerf_tools.view.assets import ViewedAssets
 
     if not 0 <= args.port < 1 << 16:
         raise InputError(f"--port must lie between 0 and 65535, got {args.port}")
     shown = ViewedAssets([args.source] + ([args.other] if args.other else []), args.light)
-    photos = Photos(args.data) if args.data else None
+    photos = ViewedPhotos(args.data) if args.data else None
     with ViewServer(shown, photos, args.host, args.port) as server, suppress(KeyboardInterrupt):  # the way to end it
         if args.host != LOCAL:
             print(f"splitnerf: note: listens at {args.host}: whoever knows the address below can look", file=sys.stderr)

@@ -131,26 +131,21 @@ def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> Finding:
 
 def _inside(views: Sequence[View], fit: Fit) -> Finding:
     suspects = dict.fromkeys(fit.inside, "camera in the object")
-    advice = f"check their poses, or leave them out: {_named(views, suspects)}" if suspects else ""
-    return Finding("cameras in the object", f"{len(suspects) or 'none'}", advice, suspects)
+    return _suspicion("cameras in the object", f"{len(suspects) or 'none'}", "check their poses, or leave them out", views, suspects)
 
 
 def _shares(views: Sequence[View]) -> Finding:
     shares = np.array([view.share for view in views])
     suspects = {int(i): f"object on {shares[i]:.1%}" for i in np.argsort(shares) if shares[i] < SMALLEST_SHARE}
-    advice = ""
-    if suspects:
-        advice = f"the object is small in {len(suspects)}, go nearer or cut them out: {_named(views, suspects)}"
-    return Finding("masks cover", f"{_range(100 * shares, '.1f')} % of the photo", advice, suspects)
+    advice = f"the object is small in {len(suspects)}, go nearer or cut them out"
+    return _suspicion("masks cover", f"{_range(100 * shares, '.1f')} % of the photo", advice, views, suspects)
 
 
 def _cut(views: Sequence[View]) -> Finding:
     shares = np.array([view.cut for view in views])
     suspects = {int(i): f"cut, {shares[i]:.0%} of the edge" for i in np.argsort(-shares) if shares[i] > LARGEST_CUT}
-    advice = ""
-    if suspects:
-        advice = f"keep the whole object in most photos, go farther away: {_named(views, suspects)}"
-    return Finding("cut by the edge", f"{len(suspects) or 'none'}", advice, suspects)
+    advice = "keep the whole object in most photos, go farther away"
+    return _suspicion("cut by the edge", f"{len(suspects) or 'none'}", advice, views, suspects)
 
 
 def _agreement(views: Sequence[View], fit: Fit) -> Finding:
@@ -200,8 +195,13 @@ def _brightness(views: Sequence[View], brightness: np.ndarray) -> Finding:
 def _clipped(views: Sequence[View]) -> Finding:
     shares = np.array([view.clipped for view in views])
     suspects = {int(i): f"clipped {shares[i]:.0%}" for i in np.argsort(-shares) if shares[i] > LARGEST_CLIPPED}
-    advice = f"expose less, what is clipped has no colour: {_named(views, suspects)}" if suspects else ""
-    return Finding("clipped", f"{_range(100 * shares, '.1f')} % of the object's pixels", advice, suspects)
+    value = f"{_range(100 * shares, '.1f')} % of the object's pixels"
+    return _suspicion("clipped", value, "expose less, what is clipped has no colour", views, suspects)
+
+
+def _suspicion(name: str, value: str, advice: str, views: Sequence[View], suspects: dict[int, str]) -> Finding:
+    """A finding whose advice, if photos are suspected, ends with their names."""
+    return Finding(name, value, f"{advice}: {_named(views, suspects)}" if suspects else "", suspects)
 
 
 def _range(values: np.ndarray, form: str) -> str:

@@ -42,8 +42,7 @@ class Foot:
 
     def __init__(self, table: Table, inside: np.ndarray, below: np.ndarray):
         self._maps = torch.from_numpy(np.stack([inside, below]))
-        self._axes = torch.from_numpy(table.axes.astype(np.float32))
-        self._normal, self._offset = torch.from_numpy(table.normal.astype(np.float32)), table.offset
+        self._table, self._axes = table, torch.from_numpy(table.axes.astype(np.float32))
 
     def holds(self, points: Tensor) -> Tensor:
         """[...] bool, whether points [..., 3] near the table, scene units, belong to the object."""
@@ -51,8 +50,7 @@ class Foot:
         asked = places.reshape(1, -1, 1, 2).flip(-1)
         maps = torch.nn.functional.grid_sample(self._maps[None], asked, align_corners=False)[0]
         inside, below = maps.view(2, *points.shape[:-1]) > 0
-        heights = points @ self._normal - self._offset
-        return (inside | (below & (heights > VAGUE))) & (places.abs() < 1).all(-1)
+        return (inside | (below & (self._table.heights(points) > VAGUE))) & (places.abs() < 1).all(-1)
 
 
 def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: np.ndarray) -> Foot:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import torch
+from torch import Tensor
 
 LEAST_HEIGHT, LARGEST_HEIGHT = 0.006, 0.06  # over the table, at which single points stand out, scene units
 ON_TABLE = 0.05  # height within which points are the table's, scene units
@@ -33,9 +35,14 @@ class Table:
         deviation = 1.4826 * float(np.median(near)) if len(near) else ON_TABLE
         return cls(normal, offset, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
 
-    def heights(self, points: np.ndarray) -> np.ndarray:
+    def heights(self, points: np.ndarray | Tensor) -> np.ndarray | Tensor:
         """Heights [...] of points [..., 3] over the table."""
-        return points @ self.normal - self.offset
+        return points @ (self.normal if isinstance(points, np.ndarray) else self.upward) - self.offset
+
+    @cached_property
+    def upward(self) -> Tensor:
+        """[3] float32, the normal."""
+        return torch.from_numpy(self.normal.astype(np.float32))
 
     @cached_property
     def axes(self) -> np.ndarray:

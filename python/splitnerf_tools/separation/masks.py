@@ -56,7 +56,7 @@ def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
 def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple[np.ndarray, np.ndarray]:
     """More points [n, 3] around a region where it meets its table, as seen from above, and their colours [n, 3], sRGB."""
     table, middle = region.table, region.middle()
-    normal = torch.from_numpy(table.normal.astype(np.float32))
+    normal = table.upward
     cells = region.centres() - middle
     reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
     centre = middle - (middle @ normal - table.offset) * normal

@@ -49,7 +49,7 @@ class Region:
         inside = _at(self.cells, points)
         if self.table is None:
             return inside
-        heights = points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset
+        heights = self.table.heights(points)
         if self.foot is None:
             return inside & (heights > 0.5 * self.table.height)
         return torch.where(heights > LOW, inside, self.foot.holds(points) & (heights > -LOW))
@@ -63,15 +63,14 @@ class Region:
         points = rays_o[:, None] + distances[..., None] * rays_d[:, None]
         solid = _at(self.solid, points) & (distances > 0)
         if self.table is not None:
-            solid &= points @ torch.from_numpy(self.table.normal.astype(np.float32)) - self.table.offset > LOW
+            solid &= self.table.heights(points) > LOW
         return solid.any(1)
 
     def above_table(self, rays_o: Tensor, rays_d: Tensor, distances: Tensor) -> Tensor:
         """Distances [n, k] along rays [n, 3], at most those of the table: what seems to lie below it is on it, vague or mirrored."""
         if self.table is None:
             return distances
-        normal = torch.from_numpy(self.table.normal.astype(np.float32))
-        height, fall = rays_o @ normal - self.table.offset, -(rays_d @ normal)
+        height, fall = self.table.heights(rays_o), -(rays_d @ self.table.upward)
         table = torch.where((fall > 0) & (height > 0), height / fall.clamp(min=1e-6), math.inf)
         return torch.minimum(distances, table[:, None])
 

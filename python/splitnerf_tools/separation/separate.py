@@ -76,7 +76,7 @@ def separate(
                 report=lambda share, told: bar.show(share, f"what is around the object, {told}"),
             )  # fmt: skip
         points = surface_points(field, train)
-        region, points = find_object(field, train, table_under(points, train, seed), points)
+        region = find_object(field, train, table_under(points, train, seed), points)
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
@@ -90,21 +90,14 @@ def separate(
     return found
 
 
-def find_object(
-    field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray | None = None
-) -> tuple[Region, np.ndarray]:
-    """What stands in the middle of the photos, and the points [n, 3] that they show, which may be given.
-
-    Raises:
-        InputError: Nothing stands there.
-    """
-    points = surface_points(field, photos) if points is None else points
+def find_object(field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray) -> Region:
+    """What stands in the middle of photos that show points [n, 3]. Raises InputError where nothing stands there."""
     if table is not None:
         table = Table.through(table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64))
     region = find_region(points, table, len(photos))
     if region is None:
         raise InputError(f"{photos.root}: nothing stands out in the middle of the photos; add masks of the object")
-    return region if table is None else region.with_foot(*points_near(field, photos, region)), points
+    return region if table is None else region.with_foot(*points_near(field, photos, region))
 
 
 def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None:

@@ -25,7 +25,7 @@ Read = TypeVar("Read")
 
 
 @dataclass(frozen=True)
-class Light:
+class ViewedLight:
     """A light: its name, and [h, 2 h, 3] float32 linear radiance of at most 1024 rows, see `read_environment`."""
 
     name: str
@@ -75,19 +75,19 @@ class ViewedAssets:
     def __init__(self, paths: list[Path], light: Path | None = None):
         self.problems: list[str] = []
         self.frame: Asset | None = None
-        self._lights: dict[int, Light] = {}
+        self._lights: dict[int, ViewedLight] = {}
         self._next, self._lock = 0, threading.Lock()
         self._first = None if light is None else self.add_light(light_of(light, light.name))
         self.sources = [self.source_of(path) for path in paths]
-        self._white = self.add_light(Light("white", np.ones((8, 16, 3), np.float32)))
+        self._white = self.add_light(ViewedLight("white", np.ones((8, 16, 3), np.float32)))
         self.keep_lights()
 
-    def light(self, number: int) -> Light | None:
+    def light(self, number: int) -> ViewedLight | None:
         """A light by its number, or None."""
         with self._lock:
             return self._lights.get(number)
 
-    def add_light(self, light: Light, number: int | None = None) -> int:
+    def add_light(self, light: ViewedLight, number: int | None = None) -> int:
         """Adds a light, or replaces the one of this number; returns its number."""
         with self._lock:
             if number is None:
@@ -177,7 +177,7 @@ def run_name(glb: Path) -> str:
     return glb.resolve().parent.name if glb.name == "mesh.glb" else glb.name
 
 
-def light_of(path: Path, name: str) -> Light:
+def light_of(path: Path, name: str) -> ViewedLight:
     """The light of an .exr or .hdr file, made smaller where it has more rows than are kept.
 
     Raises:
@@ -185,4 +185,4 @@ def light_of(path: Path, name: str) -> Light:
     """
     radiance = read_environment(path)
     height = min(radiance.shape[0], MOST_ROWS)
-    return Light(name, resize_environment(radiance, height, 2 * height))
+    return ViewedLight(name, resize_environment(radiance, height, 2 * height))

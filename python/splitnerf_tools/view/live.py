@@ -17,7 +17,7 @@ from splitnerf.data.normalisation import transform_points
 from splitnerf.errors import InputError, plain
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Observed, Observer, Wish
-from splitnerf_tools.view.assets import Light, Source, ViewedAssets
+from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedLight
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.training_asset import training_asset, training_glb
 
@@ -45,7 +45,7 @@ class Live(Observer):
 
     def __init__(self, name: str):
         self.name, self.shown, self.events = name, ViewedAssets([]), EventStream()
-        self._light = self.shown.add_light(Light("recovered light", np.ones((8, 16, 3), np.float32)))
+        self._light = self.shown.add_light(ViewedLight("recovered light", np.ones((8, 16, 3), np.float32)))
         self.shown.keep_lights()
         self._world_from_box = np.eye(4)
         self._frame(np.eye(4))
@@ -178,7 +178,7 @@ class Live(Observer):
             asset = training_asset(training.model, self._world_from_box)
         except RuntimeError:  # no surface yet, or one that the training itself refuses
             return old.version
-        self.shown.add_light(Light("recovered light", light), self._light)
+        self.shown.add_light(ViewedLight("recovered light", light), self._light)
         self.shown.sources[0] = Source(self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1)
         return old.version + 1
 

@@ -19,7 +19,7 @@ from splitnerf.files import reason
 LARGEST = 1600  # pixels of a photo's longer side in the page
 
 
-class Photos:
+class ViewedPhotos:
     """All photos of a data set, in its order.
 
     Args:

@@ -30,7 +30,7 @@ from splitnerf_tools.report.browser import as_halves
 from splitnerf_tools.view.assets import Source, ViewedAssets
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.photos import Photos
+from splitnerf_tools.view.photos import ViewedPhotos
 
 if TYPE_CHECKING:
     from splitnerf_tools.view.live import Live
@@ -82,8 +82,9 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     request_queue_size = MOST_OPEN  # connections that wait; more would try again after a second
 
     def __init__(
-        self, shown: ViewedAssets, photos: Photos | None = None, host: str = "127.0.0.1", port: int = 0, live: Live | None = None
-    ):
+        self, shown: ViewedAssets, photos: ViewedPhotos | None = None, host: str = "127.0.0.1", port: int = 0,
+        live: Live | None = None,
+    ):  # fmt: skip
         self.shown, self.photos, self.host, self.tracer, self.live = shown, photos, host, Tracer(shown), live
         self.events = EventStream() if live is None else live.events
         self.page = files("splitnerf_tools.view").joinpath("viewer.html").read_bytes()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +37,14 @@ def map_in_world(path: Path, turn: np.ndarray | None = None) -> Callable[[], np.
         path: The file.
         turn: [3, 3] the rotation from the data's world to the world of the map; None where they are the same.
     """
-    return partial(_read, path, turn)
 
+    def read() -> np.ndarray:
+        radiance = read_environment(path)
+        if radiance.shape[0] > MAP_ROWS:
+            radiance = resize_environment(radiance, MAP_ROWS, 2 * MAP_ROWS)
+        return radiance if turn is None else turn_environment(radiance, turn)
 
-def _read(path: Path, turn: np.ndarray | None) -> np.ndarray:
-    radiance = read_environment(path)
-    if radiance.shape[0] > MAP_ROWS:
-        radiance = resize_environment(radiance, MAP_ROWS, 2 * MAP_ROWS)
-    return radiance if turn is None else turn_environment(radiance, turn)
+    return read
 
 
 def read_lit_photo(frame: Frame, factor: int = 1) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,7 @@ The world is that of `world_mat`, in its own units; `scale_mat_0` ..., which say
 
 from __future__ import annotations
 
-import io
 import re
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -69,16 +67,11 @@ def read_matrices(path: Path) -> list[np.ndarray]:
         InputError: It is no such file, or it claims to hold more than it does.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            parts = {
-                part.filename: part
-                for part in archive.infolist()
-                if re.fullmatch(r"world_mat_\d{1,6}\.npy", part.filename)
-            }
-            if any(part.file_size > LONGEST_MATRIX for part in parts.values()):
+        with np.load(path, mmap_mode="r", allow_pickle=False) as archive:
+            names = [name for name in archive.files if re.fullmatch(r"world_mat_\d{1,6}", name)]
+            if any(archive.zip.getinfo(f"{name}.npy").file_size > LONGEST_MATRIX for name in names):
                 raise ValueError(f"a matrix has more than {LONGEST_MATRIX} bytes")
-            raw = {int(name[len("world_mat_") : -len(".npy")]): archive.read(part) for name, part in parts.items()}
-        found = {i: np.lib.format.read_array(io.BytesIO(data), allow_pickle=False) for i, data in raw.items()}
+            found = {int(name.removeprefix("world_mat_")): archive[name] for name in names}
     except Exception as error:  # zipfile and NumPy raise whatever they meet
         raise InputError(f"{path}: cannot be read as a file of NumPy arrays ({error}); replace it") from None
     if not found or sorted(found) != list(range(len(found))):
