@@ -117,7 +117,7 @@ def test_a_thread_beside_the_main_one_runs_commands(capsys):
     thread = threading.Thread(target=lambda: codes.append(main(["info", "--settings"])))
     thread.start()
     thread.join()
-    assert codes == [DONE] and "learning_rate" in capsys.readouterr().out
+    assert codes == [DONE] and "mask_weight" in capsys.readouterr().out
 
 
 # ---- streams ----
