@@ -10,7 +10,6 @@ import pytest
 import torch
 import trimesh
 from tiny_runs import tiny
-from torch.nn import functional as F
 
 from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset

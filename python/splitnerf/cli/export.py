@@ -18,7 +18,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Writes what RUN trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
-        "the walls of cavities are dropped.",
+        "the walls of cavities are dropped; what no photo shows is a cap between its edges.",
         epilog=examples(
             "splitnerf export runs/data --formats glb,obj --out asset",
             "splitnerf export runs/data --faces 20000 --texture-size 1024 --out small",

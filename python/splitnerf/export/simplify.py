@@ -47,11 +47,12 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> np.ndar
     A flat rim gets a flat cap. Components without seen vertices stay as they are.
 
     Args:
-        vertices, faces: The mesh, [n, 3] and [m, 3], closed.
+        vertices, faces: The mesh, [n, 3] and [m, 3].
         seen: [n] bool.
     """
-    n, edges = len(vertices), np.concatenate([faces[:, :2], faces[:, 1:], faces[:, [2, 0]]])  # each in both directions
+    n, edges = len(vertices), np.concatenate([faces[:, :2], faces[:, 1:], faces[:, [2, 0]]])
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
+    links = links.maximum(links.T)  # the rim of a mesh that is not closed
     _, component = connected_components(links, directed=False)
     free = ~seen & np.isin(component, component[seen])
     if not free.any():
