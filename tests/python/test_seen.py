@@ -70,7 +70,7 @@ def test_one_ray_that_slips_through_shows_nothing():
 def test_behind_a_camera_nothing_is_seen():
     pose = torch.eye(4)
     pose[2, 3] = -DISTANCE  # looks down, away from the sphere
-    assert not seen(sphere(0.5), from_above()._replace(poses=pose[None])).any()
+    assert not seen(sphere(0.5), from_above(focal=1e-4)._replace(poses=pose[None])).any()  # so wide that it would show all
 
 
 def test_all_cameras_count():
@@ -107,12 +107,13 @@ def test_bodies_that_no_photo_shows_stay():
 
 
 def test_a_cap_keeps_its_places_and_normals():
-    """The field's level set lies near it, but a cap is no part of it: no vertex moves there, no normal leans."""
+    """The field's level set lies near it, but a cap is no part of it: no vertex moves there, no normal leans, and its
+    albedo is that of its rim, at z = 0."""
     mesh = sphere(0.82)
     surface = ball()
 
     def leaning(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return *surface.materials(x)[:3], surface.gradient(x)[1]
+        return 0.5 + 0.5 * x[:, 2:].expand(-1, 3), *surface.materials(x)[1:3], surface.gradient(x)[1]
 
     found = textured_asset(
         "ball", np.float32(mesh.vertices), np.int32(mesh.faces), dataclasses.replace(surface, materials=leaning),
@@ -125,3 +126,5 @@ def test_a_cap_keeps_its_places_and_normals():
     row, column = (np.clip((found.uv * 128).astype(int), 0, 127)).T[::-1]
     flat = found.materials[0].normal_texture[row, column, 2]
     assert flat[up < -0.2].min() > 0.999
+    albedo = found.materials[0].albedo_texture[row, column]
+    assert albedo[up < -0.2] == pytest.approx(0.5, abs=0.06) and albedo[up > 0.5].min() > 0.7

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from scipy.ndimage import distance_transform_edt, zoom
+from scipy.spatial import cKDTree
 
 from splitnerf import _core
 from splitnerf.export.surface import Surface, surface_materials, to_level_set
@@ -110,8 +111,8 @@ def bake(
         size: The number of texels along an edge.
         reach: The largest distance between mesh and level set, in the surface's units.
         offset: The distance of an occlusion ray's start from the mesh along its normal, in the surface's units.
-        on_surface: [n] bool, the vertices of the zero level set; texels of faces with others stay where they are, with
-            the mesh's normals. None: all.
+        on_surface: [n] bool, the vertices of the zero level set; texels of faces with others have the mesh's normals, and
+            the materials of the nearest one of these vertices. None: all.
 
     Returns:
         The maps; a texel outside the charts has the value of the nearest texel inside.
@@ -121,18 +122,19 @@ def bake(
     """
     albedo, roughness_metallic, normal = (np.zeros((size * size, width), np.float32) for width in (3, 2, 3))
     covered = np.zeros(size * size, bool)
+    on_surface = np.ones(len(mesh.vertices), bool) if on_surface is None else on_surface
+    known = mesh.vertices[on_surface]
     for texels in bands(mesh.uv, mesh.faces, size):
         if len(texels.index) == 0:
             continue
         rows, normals = texels.index, texels.interpolate(mesh.normals, mesh.faces)
         places, smooth = texels.interpolate(mesh.vertices, mesh.faces), _unit(normals)
         points = to_level_set(surface, places, reach, smooth)
-        if on_surface is not None:
-            capped = ~on_surface[mesh.faces[texels.triangle]].all(axis=1)
-            points[capped] = places[capped]
+        capped = np.flatnonzero(~on_surface[mesh.faces[texels.triangle]].all(axis=1))
+        if len(capped):
+            points[capped] = known[cKDTree(known).query(places[capped])[1]]
         albedo[rows], roughness, metallic, fine_normals = surface_materials(surface, points)
-        if on_surface is not None:
-            fine_normals[capped] = smooth[capped]
+        fine_normals[capped] = smooth[capped]
         roughness_metallic[rows] = np.column_stack([roughness, metallic])
         normal[rows] = to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))
         covered[rows] = True
