@@ -95,7 +95,7 @@ def write_assets(
         vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.constants.box, resolution))
         spacing = 2.0 * c.constants.box / (resolution - 1)
         seen = seen_vertices(vertices, faces, cameras, 0.25 * spacing)
-        vertices = capped(vertices, faces, seen)
+        vertices, on_surface = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
         exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
@@ -104,7 +104,7 @@ def write_assets(
         if set(formats) - {"ply"}:
             textured = textured_asset(
                 "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
-                spacing=spacing, occlusion_offset=c.constants.occlusion_offset, on_surface=seen,
+                spacing=spacing, occlusion_offset=c.constants.occlusion_offset, on_surface=on_surface,
                 tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
             )  # fmt: skip
             bar.show(0.9, "export, files")

@@ -90,7 +90,8 @@ def test_a_flat_rim_gets_a_flat_cap():
     vertices = mesh.vertices.copy()
     edge = rim & np.isin(np.arange(len(rim)), mesh.edges[~rim[mesh.edges].all(1)])
     vertices[edge, 2] = -0.2
-    moved = capped(np.float32(vertices), mesh.faces, rim)
+    moved, stays = capped(np.float32(vertices), mesh.faces, rim)
+    assert np.array_equal(stays, rim)
     assert np.array_equal(moved[rim], np.float32(vertices)[rim])
     assert moved[~rim, 2] == pytest.approx(-0.2, abs=1e-4)
     disc = trimesh.Trimesh(moved, mesh.faces, process=False)
@@ -102,8 +103,9 @@ def test_bodies_that_no_photo_shows_stay():
     mesh = sphere(0.5) + sphere(0.5, 2.0)
     n = len(mesh.vertices) // 2
     flags = np.arange(2 * n) < n
-    assert np.array_equal(capped(np.float32(mesh.vertices), mesh.faces, flags), np.float32(mesh.vertices))
-    assert np.array_equal(capped(np.float32(mesh.vertices), mesh.faces, ~flags | flags), np.float32(mesh.vertices))
+    for seen in (flags, ~flags | flags, flags & False):
+        moved, stays = capped(np.float32(mesh.vertices), mesh.faces, seen)
+        assert np.array_equal(moved, np.float32(mesh.vertices)) and stays.all()
 
 
 def test_a_cap_keeps_its_places_and_normals():

@@ -41,14 +41,17 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
     return vertices, faces, int(dropped.sum())
 
 
-def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Vertices [n, 3] of which those not seen lie on a membrane between those seen, in the middle of their neighbours.
+def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Moves the vertices that are not seen on to a membrane between those seen: each into the middle of its neighbours.
 
     A flat rim gets a flat cap. Components without seen vertices stay as they are.
 
     Args:
         vertices, faces: The mesh, [n, 3] and [m, 3].
         seen: [n] bool.
+
+    Returns:
+        vertices [n, 3], and [n] bool, those that stay.
     """
     n, edges = len(vertices), np.concatenate([faces[:, :2], faces[:, 1:], faces[:, [2, 0]]])
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
@@ -56,12 +59,12 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> np.ndar
     _, component = connected_components(links, directed=False)
     free = ~seen & np.isin(component, component[seen])
     if not free.any():
-        return vertices
+        return vertices, ~free
     balance = (diags(np.asarray(links.sum(1)).ravel()) - links)[free]
     result, pull = vertices.copy(), -(balance[:, ~free] @ vertices[~free].astype(np.float64))
     for axis in range(3):
         result[free, axis] = cg(balance[:, free], pull[:, axis], x0=vertices[free, axis], rtol=1e-6, maxiter=5000)[0]
-    return result
+    return result, ~free
 
 
 def is_closed(faces: np.ndarray) -> bool:
