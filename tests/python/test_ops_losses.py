@@ -1,18 +1,15 @@
-"""Terms of the loss: closed forms, the formulas as written in torch, gradients, errors."""
+"""Terms of the loss and the curve of sRGB: closed forms, and numbers at which the formulas bend."""
 
 from __future__ import annotations
 
 import math
 
 import pytest
-import reference
 import torch
 from op_cases import field_gradients, pixel_inputs
 from op_checks import generator, lib
 
-from splitnerf.ops import gradient_losses, linear_to_srgb, pixel_losses, quadratic_entropy, srgb_to_linear
-
-
+from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_losses, quadratic_entropy, srgb_to_linear
 
 # ---- pixels ----
 
@@ -37,9 +34,8 @@ def test_a_clipped_photo_asks_only_for_enough():
     colour, _ = pixel_losses(bright, opacity, target, torch.zeros(4, 3), linear=False)
     colour.backward()
     assert colour.item() == 0.0 and torch.equal(bright.grad, torch.zeros(4, 3))
-    assert pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)[
-        0
-    ].item() == pytest.approx(0.25)
+    colour, _ = pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)
+    assert colour.item() == pytest.approx(0.25)
 
 
 def test_a_whole_pixel_is_compared_with_what_the_camera_added_up():
@@ -100,9 +96,7 @@ def test_neighbours_at_a_right_angle_count_whatever_their_rounding(dtype):
 
 def test_normals_a_rounding_apart_know_in_which_direction():
     """The difference of such normals is rounding along themselves; its gradient must not see that."""
-    gradients = torch.tensor(
-        [[-2.1564362e-10, -2.3488480e-10, 1.51317392e-3], [-6.111313e-10, -7.259329e-10, 4.662408e-3]]
-    )
+    gradients = torch.tensor([[-2.1564362e-10, -2.3488480e-10, 1.51317392e-3], [-6.111313e-10, -7.259329e-10, 4.662408e-3]])
     found = []
     for dtype in (torch.float32, torch.float64):
         g = gradients.to(dtype).requires_grad_()
@@ -142,10 +136,6 @@ def test_a_nan_shows():
 # ---- entropy ----
 
 
-def points(n: int, c: int = 5, dtype=torch.float64) -> torch.Tensor:
-    return 2 * torch.randn(n, c, generator=generator(), dtype=torch.float64).to(dtype)
-
-
 @pytest.mark.parametrize("n", [1, 7, 300])
 def test_points_alike_have_none_and_points_far_apart_the_logarithm_of_their_number(n):
     assert quadratic_entropy(torch.full((n, 3), 0.7)).item() == pytest.approx(0.0, abs=1e-6)
@@ -153,20 +143,65 @@ def test_points_alike_have_none_and_points_far_apart_the_logarithm_of_their_numb
     assert quadratic_entropy(apart).item() == pytest.approx(math.log(n), rel=1e-6, abs=1e-6)
 
 
-@pytest.mark.parametrize("n", [1, 2, 31, 200])
-@pytest.mark.parametrize("shift", [0.0, 1000.0])
-def test_it_and_its_gradient_are_the_sum_over_pairs(n, shift):
-    ours, theirs = (points(n) + shift).requires_grad_(), (points(n) + shift).requires_grad_()
-    entropy, expected = quadratic_entropy(ours), reference.quadratic_entropy(theirs)
-    torch.testing.assert_close(entropy, expected, rtol=1e-9, atol=1e-12)
-    (3 * entropy).backward()
-    (3 * expected).backward()
-    torch.testing.assert_close(ours.grad, theirs.grad, rtol=1e-7, atol=1e-12)
-
-
 def test_a_nan_and_an_infinity_show():
-    x = points(40)
+    x = torch.randn(40, 5, generator=generator())
     x[3, 1] = math.nan
     assert quadratic_entropy(x).isnan()
     x[3, 1] = math.inf
     assert not quadratic_entropy(x).isfinite() or lib.quadratic_entropy(x)[1].isnan().any()
+
+
+# ---- the light's prior ----
+
+SIZES = [16, 64, 256]
+
+
+def test_a_light_of_one_colour_is_free_and_a_texel_costs_what_its_level_is_worth():
+    light = torch.zeros(sum(SIZES), 3, dtype=torch.float64)
+    light[:16] += torch.tensor([0.5, 0.0, -0.7])
+    assert light_prior(light, SIZES).item() == pytest.approx(0, abs=1e-25)
+    for texel, n in ((16, 64), (16 + 63, 64), (16 + 64, 256), (335, 256)):
+        for change, cost in (([0.9] * 3, 0.81 / 0.75), ([0.9, 0.0, -0.9], 0.54 / 0.12)):
+            changed = light.clone()
+            changed[texel] += torch.tensor(change)
+            assert light_prior(changed, SIZES).item() == pytest.approx(math.log1p(cost) / n, rel=1e-7)
+
+
+def test_the_brightness_of_the_whole_light_has_no_gradient():
+    light = 1.5 * torch.randn(sum(SIZES), 3, generator=generator(3), dtype=torch.float64)
+    light.requires_grad_()
+    light_prior(light, SIZES).backward()
+    torch.testing.assert_close(light.grad[:16].sum(0), torch.zeros(3, dtype=torch.float64), rtol=0, atol=1e-15)
+    assert light.grad[:16].abs().min() > 0 and light.grad[16:].abs().min() > 0
+    with torch.no_grad():
+        light[7, 1] = math.nan
+    assert light_prior(light, SIZES).isnan()
+
+
+# ---- sRGB ----
+
+
+def test_values_of_the_standard():
+    """IEC 61966-2-1: 0.5 decodes to 0.21404, the joint at 0.04045 to 0.0031308."""
+    decoded = srgb_to_linear(torch.tensor([0.0, 0.04045, 0.5, 1.0], dtype=torch.float64))
+    assert decoded.tolist() == pytest.approx([0, 0.0031308, 0.2140411, 1], abs=1e-7)
+    assert linear_to_srgb(torch.tensor([-1.0, 0.0, 0.5, 4.0])).tolist() == pytest.approx(
+        [0, 0, 0.735357, 1.824796], abs=1e-5
+    )
+
+
+@pytest.mark.parametrize("dtype, atol", [(torch.float32, 1e-6), (torch.float64, 1e-7)])
+def test_each_undoes_the_other(dtype, atol):
+    """To 1e-7, by which the standard's two branches miss each other at the joint."""
+    values = torch.linspace(0, 4, 4001, dtype=dtype).view(1, -1)
+    torch.testing.assert_close(linear_to_srgb(srgb_to_linear(values)), values, rtol=0, atol=atol)
+
+
+def test_the_curve_has_a_gradient_below_its_bend():
+    x = torch.tensor([-0.1, 0.0, 1e-9, 0.5], requires_grad=True)
+    linear_to_srgb(x).sum().backward()
+    assert x.grad[:3].tolist() == pytest.approx([0, 12.92, 12.92]) and torch.isfinite(x.grad).all()
+
+
+def test_a_nan_of_the_curve_shows():
+    assert torch.isnan(linear_to_srgb(torch.tensor([torch.nan]))).all()

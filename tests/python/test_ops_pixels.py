@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
-from op_checks import check_error, generator
+from op_checks import generator
 
 from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
 
@@ -89,19 +89,3 @@ def test_pixels_of_runs_have_a_colour_of_their_own_behind_them():
             expected = RANDOM[i] if k is None else EDGES.behind[k] / 255
             torch.testing.assert_close(behind[i], expected)
     assert not read(torch.zeros(8, 4), [2, 6], EdgeRuns.none(CPU))[3].any()
-
-
-def test_what_does_not_fit_is_named():
-    check_error(lambda: drawn([0.5], 2), "draw_rays", "n_near must be from 0 to the number of rays")
-    check_error(lambda: drawn([0.5], 1, near=PixelList.all(0, CPU)), "draw_rays", "near has no pixels")
-    check_error(lambda: drawn([0.5], 0, known=PixelList.all(0, CPU)), "draw_rays", "known has no pixels")
-    check_error(lambda: drawn([0.5], 0, known=RUNS._replace(count=0)), "draw_rays", "known has runs without pixels")
-    no_views = torch.zeros(0, 3, 3), torch.zeros(0, 3)
-    check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *no_views, 4, 5), "draw_rays", "there are no views")
-    check_error(lambda: draw_rays(torch.ones(1), 0, EVERY, EVERY, *CAMERAS, 0, 5), "draw_rays", "height and width")
-    for codes, text in ((torch.zeros(8, 4, dtype=torch.int32), "codes must be uint8, int16 or float32"), (torch.zeros(8, 3), "codes")):
-        check_error(lambda: read(codes, [0]), "read_pixels", text)  # noqa: B023
-    check_error(lambda: read(torch.zeros(8, 4), [0, 8]), "read_pixels", "index must hold numbers of pixels")
-    check_error(lambda: read(torch.zeros(12, 4), [8]), "read_pixels", "view must hold numbers of photos")
-    check_error(lambda: read(torch.zeros(8, 4), [0], EDGES._replace(ends=EDGES.ends[:1])), "read_pixels", "edge_ends must be [2]")
-    check_error(lambda: read(torch.zeros(0, 4), [0]), "read_pixels", "there are no photos")

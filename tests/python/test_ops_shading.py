@@ -1,4 +1,4 @@
-"""light_queries and split_sum_shade."""
+"""light_queries, split_sum_shade, and the sums over directions: monte_carlo_light, summed_light and shade_sums."""
 
 from __future__ import annotations
 
@@ -6,23 +6,16 @@ import math
 
 import pytest
 import torch
-from op_checks import DEVICES, check_error, lib, unit
-from shading_inputs import indirect_inputs, query_inputs, split_sum_inputs
+from op_cases import drawn_inputs, shared_inputs
+from op_checks import check_error, lib, unit
+from reference import drawn_directions
+from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
 
-from splitnerf.ops import brdf_lut, light_queries, split_sum_shade
+from splitnerf.ops import (
+    LightSums, brdf_lut, light_queries, monte_carlo_light, shade_sums, shading, split_sum_shade, summed_correction, summed_light,
+)  # fmt: skip
 
-@pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize("stacked", [False, True])
-def test_indirect_light_is_light_that_nothing_hides(channels, stacked):
-    """As if the light were o L + I and nothing in its way; the light comes in two tensors or, as it answers, in one."""
-    inputs = indirect_inputs(torch.float64, channels=channels, n=40, stacked=stacked)
-    *points, specular, diffuse, occlusion_s, occlusion_d, lut, mode, gain, indirect_s, indirect_d = inputs
-    if stacked:
-        specular, diffuse = specular.chunk(2)
-    one = torch.ones(40, 1, dtype=torch.float64)
-    arriving = occlusion_s * specular + indirect_s, occlusion_d * diffuse + indirect_d
-    expected = lib.split_sum_shade(*points, *arriving, one, one, lut, mode, gain, None, None)
-    torch.testing.assert_close(lib.split_sum_shade(*inputs), expected, rtol=1e-12, atol=1e-12)
+# ---- the split sum ----
 
 
 def test_light_queries_end_with_the_normals_on_the_viewers_side():
@@ -31,29 +24,9 @@ def test_light_queries_end_with_the_normals_on_the_viewers_side():
     side = (normals * views).sum(1, keepdim=True).sign()
     assert (side < 0).any() and torch.equal(directions[7:], side * normals)
     assert torch.equal(asked, torch.cat([roughness, torch.ones_like(roughness)]))
-    check_error(lambda: light_queries(normals, views, roughness, "median"), "light_queries", "query", "mean", "median")
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_white_furnace(device):
-    normals, views, _, roughness, *_ = split_sum_inputs(device, torch.float64, n=500)
-    one = torch.ones_like(normals)
-    single = torch.ones_like(roughness)
-    dielectric = split_sum_shade(normals, views, one, roughness, 0 * single, one, one, single, single)
-    metal = split_sum_shade(normals, views, one, roughness, single, one, one, single, single, compensate=True)
-    torch.testing.assert_close(dielectric, one)
-    torch.testing.assert_close(metal, one)
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_table_holds_its_exact_value(device):
-    f1, f2, chi, _ = brdf_lut(device)[-1, -1].tolist()
-    assert f1 + f2 == pytest.approx(1 - math.log(2), abs=1e-4) and chi == pytest.approx(0, abs=1e-3)
 
 
 def test_table_made_in_inference_mode_serves_training():
-    from splitnerf.ops import shading
-
     shading._brdf_lut.cache_clear()
     with torch.inference_mode():
         brdf_lut()
@@ -62,18 +35,17 @@ def test_table_made_in_inference_mode_serves_training():
     assert normals.grad.abs().sum() > 0
 
 
-def test_an_unknown_fresnel_mode_is_named():
+def test_an_option_that_is_not_known_is_named():
     inputs = split_sum_inputs("cpu", torch.float32)
     check_error(lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast")
+    check_error(lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median"), "light_queries", "query", "mean", "median")
 
 
 @pytest.mark.parametrize("compensate", [False, True])
 def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
     """F1 + F2 is 1 but for a millionth there, and the gradient to roughness is the change of that millionth."""
     normals, view_dirs = (unit(torch.tensor([x])) for x in ([0.887, -0.036, -0.460], [-0.849, 0.157, 0.504]))
-    rest = [
-        torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])
-    ]
+    rest = [torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])]
     found = []
     for dtype in (torch.float32, torch.float64):
         inputs = [x.to(dtype) for x in (normals, view_dirs, *rest)]
@@ -81,3 +53,81 @@ def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
         out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate, None, None)
         found.append([torch.autograd.grad(x, roughness, retain_graph=True)[0].item() for x in out[0]])
     assert found[0] == pytest.approx(found[1], rel=1e-5)
+
+
+# ---- sums over light ----
+
+
+def at(n_dot_v: float, roughness: float, dtype=torch.float64) -> tuple:
+    normals = torch.tensor([[0.0, 0.0, 1.0]], dtype=dtype)
+    view_dirs = torch.tensor([[math.sqrt(1 - n_dot_v**2), 0.0, n_dot_v]], dtype=dtype)
+    return normals, view_dirs, torch.tensor([[roughness]], dtype=dtype)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("n_dot_v", [0.2, 0.6, 1.0])
+def test_a_white_sky_gives_the_brdf_table(n_dot_v, roughness):
+    """Under radiance 1 the sums are F1 + F2, F2, 1 and E_d."""
+    point = at(n_dot_v, roughness)
+    directions, pdf = drawn_directions(*point, 0.5, 1 << 16)
+    sums = monte_carlo_light(*point, directions, pdf, torch.ones_like(directions))
+    table = brdf_lut().double()
+    x, y = math.sqrt(n_dot_v) * 31, roughness * 31
+    x0, y0 = min(int(x), 30), min(int(y), 30)
+    rows = [torch.lerp(table[j, x0], table[j, x0 + 1], x - x0) for j in (y0, y0 + 1)]
+    f1, f2, _, layer = torch.lerp(*rows, y - y0).tolist()
+    assert sums.specular[0].tolist() == pytest.approx([f1 + f2] * 3, abs=4e-3)
+    assert sums.grazing[0].tolist() == pytest.approx([f2] * 3, abs=3e-3)
+    assert sums.diffuse[0].tolist() == pytest.approx([1.0] * 3, abs=1e-3)
+    assert sums.dielectric[0].tolist() == pytest.approx([layer] * 3, abs=1e-3)
+
+
+def test_a_normal_that_faces_away_is_turned():
+    normals, view_dirs, roughness, directions, pdf, radiance = drawn_inputs()
+    flipped = monte_carlo_light(-normals, view_dirs, roughness, directions, pdf, radiance)
+    for a, b in zip(flipped, monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)):
+        torch.testing.assert_close(a, b)
+
+
+# ---- what is reflected of them ----
+
+
+@pytest.mark.parametrize("compensate", [False, True])
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
+    """Where the light is L over the specular lobe, the sums are (F1 + F2) L, F2 L and E_d L."""
+    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs(200)
+    light, _, diffuse, _ = sums.unbind(1)
+    normals = turned * normals
+    one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
+    metal = torch.ones_like(metallic)
+
+    def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
+        return split_sum_shade(normals, view_dirs, albedo, roughness, metallic, one, black, one, one)
+
+    sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
+    there = split_sum_shade(normals, view_dirs, albedo, roughness, metallic, light, diffuse, one, one, "exact", compensate)
+    torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, compensate), there)
+
+
+def test_light_at_grazing_angles_alone_is_reflected_whole():
+    """All of the light where both Fresnel terms are 1: reflected by every material alike."""
+    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs()
+    light = sums[:, 0]
+    sums = LightSums(light, light, torch.zeros_like(light), light)
+    torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums), light)
+
+
+def test_a_sum_of_another_shape_is_named():
+    x = sums_inputs()
+    specular, grazing, diffuse, dielectric = x[5].unbind(1)
+    with pytest.raises(ValueError, match=r"grazing must be \[6, 3\], got \[6, 1\]"):
+        shade_sums(*x[:5], LightSums(specular, grazing[:, :1], diffuse, dielectric))
+
+
+def test_the_correction_is_the_sum_less_the_split_by_its_share():
+    normals, view_dirs, roughness, *light = shared_inputs(12)
+    albedo, metallic, split, share = (torch.rand(12, *k, dtype=torch.float64) for k in ((3,), (1,), (3,), ()))
+    summed = shade_sums(normals, view_dirs, albedo, roughness, metallic, summed_light(normals, view_dirs, roughness, *light), True)
+    found = summed_correction(normals, view_dirs, albedo, roughness, metallic, split, share, *light, compensate=True)
+    torch.testing.assert_close(found, (summed - split) * share[:, None])

@@ -10,8 +10,7 @@ import pytest
 import torch
 import trimesh
 from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, scene_of
-from op_cases import cached_occlusion_inputs, cached_visibility_inputs
-from op_checks import check_error, check_no_gradient, check_op, generator, lib, unit
+from op_checks import generator, lib, unit
 from torch.nn import functional as F
 
 from splitnerf import _core
@@ -359,47 +358,3 @@ def test_sums_of_directions_agree_with_the_factors():
     torch.testing.assert_close(
         (arriving * cosine[..., None]).sum(1) / cosine.sum(1, keepdim=True), i_d, rtol=1e-4, atol=1e-5
     )
-
-
-# ---- the operators ----
-
-
-def test_opcheck_precision_and_gradients():
-    scene, mesh = scene_of(trimesh.creation.icosphere(1)), trimesh.creation.icosphere(1)
-    check_op(lib.visibility_bits, (scene.handle, *corners(mesh), lattice(64), OFFSET, True))
-    check_op(lib.vertex_grids, (corners(mesh)[0], 0.2, 3))
-    for with_hits in (False, True):
-        check_op(lib.cached_occlusion, cached_occlusion_inputs(torch.float32, with_hits=with_hits))
-    for a, b in zip(*(lib.cached_occlusion(*cached_occlusion_inputs(t)) for t in (torch.float32, torch.float64))):
-        torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
-    for index in (0, 1, 2, 3, 4, 11, 13):
-        check_no_gradient(lib.cached_occlusion, cached_occlusion_inputs(torch.float32), index)
-    for with_hits in (False, True):
-        check_op(lib.cached_visibility, cached_visibility_inputs(torch.float32, with_hits=with_hits))
-    for a, b in zip(*(lib.cached_visibility(*cached_visibility_inputs(t)) for t in (torch.float32, torch.float64))):
-        torch.testing.assert_close(a.double(), b, rtol=0, atol=2e-5)
-    for index in (0, 1, 2, 3, 9, 10):
-        check_no_gradient(lib.cached_visibility, cached_visibility_inputs(torch.float32), index)
-    assert all(t.shape == (0, 3) for t in lib.cached_occlusion(*cached_occlusion_inputs(torch.float32, 0)))
-
-
-def test_errors():
-    scene, (x, n), w = scene_of(trimesh.creation.icosphere(1)), corners(trimesh.creation.icosphere(1)), lattice(64)
-    check_error(lambda: visibility_bits(scene, x, n[1:], w), "visibility_bits", "normals", "[42, 3]", "[41, 3]")
-    check_error(lambda: visibility_bits(scene, x, n, w[:40]), "visibility_bits", "multiple of 32")
-    check_error(lambda: lib.vertex_grids(x, 0.0, 2), "vertex_grids", "radius")
-    good = cached_occlusion_inputs(torch.float32)
-    for index, part in (
-        (3, "roughness"),
-        (5, "vertex_normals"),
-        (9, "bits"),
-        (10, "hits"),
-        (13, "light"),
-    ):
-        bad = (*good[:index], good[index][1:], *good[index + 1 :])
-        check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", part)
-    bad = (*good[:11], good[11][:, :2], *good[12:])
-    check_error(lambda: lib.cached_occlusion(*bad), "cached_occlusion", "radiance")
-    short = cached_visibility_inputs(torch.float32)
-    check_error(lambda: lib.cached_visibility(short[0], short[1][1:], *short[2:]), "cached_visibility", "normals")
-    check_error(lambda: lib.cached_occlusion(*good[:7], good[7] + 1, *good[8:]), "cached_occlusion", "order")

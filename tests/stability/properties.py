@@ -132,7 +132,7 @@ def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     wrong = ((length - 1).abs() > 2e-6) & (found.pdf > 0)
     lit = (found.visible > 0) | (found.sent > 0).any(-1)
     wrong |= lit & ((directions * geometric[:, None]).sum(-1) < -1e-6) | lit & (found.pdf <= 0)
-    wrong |= (found.visible > 0) & (found.sent > 0).any(-1)
+    wrong |= (found.visible > 0) & (found.sent > 0).any(-1) | (rows["normals"] == 0).all(1, keepdim=True) & (found.pdf > 0)
     limits = ((found.pdf, 3e38), (found.sent, 1e9), (found.visible, 1.0))
     broken = torch.stack([finite_in(x, 0.0, limit) for x, limit in limits]).amax(0)
     broken = torch.where(wrong.any(1), 1.0, broken)
