@@ -48,7 +48,7 @@ def run(quick: bool, rounds: int) -> Result:
         ]
         if extra:
             moved = n * (FLOATS_A_POINT + FLOATS_BACK) * 4
-            rate, copy_rate = moved / times["splitnerf"].seconds, 2 * n * FLOATS_A_POINT * 4 / times["copy"].seconds
+            rate, copy_rate = moved / times["splitnerf"].median, 2 * n * FLOATS_A_POINT * 4 / times["copy"].median
             findings.append(
                 f"{title}: {rate / 1e9:.1f} GB/s of inputs, results and gradients, {rate / copy_rate:.0%} of what a copy moves"
             )

@@ -22,7 +22,7 @@ from splitnerf.ops import (
 )
 from splitnerf_tools.bench.charts import Chart, Point, Result
 from splitnerf_tools.bench.harness import rms
-from splitnerf_tools.bench.lights import MapLight, lights
+from splitnerf_tools.bench.subjects import MapLight, lights
 from splitnerf_tools.bench.prefilter import Truth
 from reference import drawn_directions
 

@@ -11,8 +11,8 @@ import trimesh
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf_tools.synth.cameras import orbit, spiral
-from splitnerf_tools.synth.jobs import (
+from splitnerf_tools.synth.orbits import orbit, spiral
+from splitnerf_tools.synth.rendering import (
     CAMERA_ANGLE_X, CAMERA_DISTANCE, TEST_ELEVATION, TEST_SWING, TRAIN_ELEVATIONS, SynthSettings, normalised, synthesise,
     unit_sphere,
 )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pretend_graphs
 import pytest
 import torch
-from bench.launches import Launches
+from launches import Launches
 from pretend_gpu import pretend_gpu
 from test_start import shape_of_ball
 from tiny_runs import lines_of, tiny
@@ -84,9 +84,9 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
 
     def apart(function):
         def counted(*arguments):
-            before = launches.launches.total()
+            before = launches.total
             result = function(*arguments)
-            inside["launches"] += launches.launches.total() - before
+            inside["launches"] += launches.total - before
             return result
 
         return counted
@@ -94,9 +94,9 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
     def watched(training, bar):
         if training.step == 57:
             training.model.variance.data.sub_(0.1)
-        before, outside = used.copy(), launches.launches.total() - inside["launches"]
+        before, outside = used.copy(), launches.total - inside["launches"]
         advance(training, bar)
-        outside, taken = launches.launches.total() - inside["launches"] - outside, training.take_step
+        outside, taken = launches.total - inside["launches"] - outside, training.take_step
         how = next(way for way in ("recorded", "called", "replayed") if used[way] > before[way])
         n_rays = len(taken.newest[0].target)
         steps.append(Taken(how, outside, n_rays, len(taken._with_kernels), taken.skipped, training.mesh.made_at))

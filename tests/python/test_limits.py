@@ -17,7 +17,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.evaluate.jobs import Protocol, evaluate_asset
 from splitnerf.export.glb import write_glb
-from splitnerf_tools.synth.jobs import SynthSettings, synthesise
+from splitnerf_tools.synth.rendering import SynthSettings, synthesise
 
 SPP = 4
 

@@ -16,7 +16,7 @@ from splitnerf.ops import (
     summed_light,
 )
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf_tools.bench.lights import MapLight
+from splitnerf_tools.bench.subjects import MapLight
 from reference import drawn_directions
 
 COSINES, ROUGHNESS, METALLIC = (0.2, 0.5, 0.9), (0.1, 0.4, 0.8), (0.0, 0.5, 1.0)

@@ -26,7 +26,7 @@ from splitnerf.training.start import (
     fit_to,
     surface_depths,
 )
-from splitnerf_tools.synth.cameras import spiral
+from splitnerf_tools.synth.orbits import spiral
 
 SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48
 

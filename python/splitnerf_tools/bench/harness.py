@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import statistics
 import time
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -22,25 +21,15 @@ SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within
 SETTLING = 0.004  # seconds of pause before each measurement, since threads of the call before still spin
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Seconds of one call: the median of the rounds, and the quartiles."""
+class Quartiles(NamedTuple):
+    """The median of the rounds, and the quartiles: seconds of one call, or the ratio of two calls' times."""
 
-    seconds: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Ratio:
-    """The ratio of two calls' times: the median over rounds in which both ran, and the quartiles."""
-
-    value: float
+    median: float
     low: float
     high: float
 
     def __str__(self) -> str:
-        return f"{self.value:.2f}x ({self.low:.2f} to {self.high:.2f})"
+        return f"{self.median:.2f}x ({self.low:.2f} to {self.high:.2f})"
 
 
 class Times:
@@ -49,12 +38,12 @@ class Times:
     def __init__(self, seconds: Mapping[Hashable, list[float]]):
         self.seconds = seconds
 
-    def __getitem__(self, name: Hashable) -> Timing:
-        return Timing(*_median_and_quartiles(self.seconds[name]))
+    def __getitem__(self, name: Hashable) -> Quartiles:
+        return _median_and_quartiles(self.seconds[name])
 
-    def ratio(self, slow: Hashable, fast: Hashable) -> Ratio:
+    def ratio(self, slow: Hashable, fast: Hashable) -> Quartiles:
         """The ratio of the times of `slow` to those of `fast`, round by round."""
-        return Ratio(*_median_and_quartiles([a / b for a, b in zip(self.seconds[slow], self.seconds[fast])]))
+        return _median_and_quartiles([a / b for a, b in zip(self.seconds[slow], self.seconds[fast])])
 
 
 def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> Times:
@@ -81,11 +70,9 @@ def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> 
     return Times(seconds)
 
 
-def _median_and_quartiles(values: list[float]) -> tuple[float, float, float]:
-    if len(values) < 2:
-        return values[0], values[0], values[0]
-    low, middle, high = statistics.quantiles(values, n=4, method="inclusive")
-    return middle, low, high
+def _median_and_quartiles(values: list[float]) -> Quartiles:
+    low, median, high = np.quantile(values, (0.25, 0.5, 0.75))
+    return Quartiles(float(median), float(low), float(high))
 
 
 def rms(values: ArrayLike) -> float:
@@ -117,7 +104,7 @@ def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:
 
 
 def chart_of(
-    title: str, cost: str, error: str, times: Times | Mapping[tuple[str, str], Timing],
+    title: str, cost: str, error: str, times: Times | Mapping[tuple[str, str], Quartiles],
     errors: Mapping[tuple[str, str], float], default: Collection[tuple[str, str]], scale: float = 1e3,
 ) -> Chart:  # fmt: skip
     """Times against errors.
@@ -132,7 +119,7 @@ def chart_of(
     points = []
     for key, value in errors.items():
         t = times[key]
-        points.append(Point(*key, scale * t.seconds, value, scale * t.low, scale * t.high, key in default))
+        points.append(Point(*key, scale * t.median, value, scale * t.low, scale * t.high, key in default))
     return Chart(title, cost, error, points)
 
 

@@ -17,9 +17,7 @@ from splitnerf.fields.visibility import VisibilityBits
 from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe
 from splitnerf_tools.bench.charts import Chart, Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, rms
-from splitnerf_tools.bench.lights import MapLight, lights
-from splitnerf_tools.bench.meshes import armadillo, bumpy_sphere
-from splitnerf_tools.bench.peers import drjit_ready, peer
+from splitnerf_tools.bench.subjects import MapLight, armadillo, bumpy_sphere, drjit_ready, lights, peer
 
 OFFSET = 0.0125
 ROUGHNESS = 0.3
@@ -30,7 +28,7 @@ SOURCES = ("cpp/*occlusion*", "cpp/*visibility*", "cpp/*scene*", "python/splitne
 LARGE = 500  # columns and rows of the mesh of 500k triangles
 
 
-class Points:
+class SurfacePoints:
     """Points on a mesh's faces with interpolated normals, mirror directions of random views, and the light above
     them."""
 
@@ -72,7 +70,7 @@ def run(quick: bool, rounds: int) -> Result:
     environments = lights()
     charts = []
     for name in list(environments)[-1:] if quick else environments:
-        charts += error_charts(name, Points(mesh, 500 if quick else 2000, environments[name]), quick, rounds)
+        charts += error_charts(name, SurfacePoints(mesh, 500 if quick else 2000, environments[name]), quick, rounds)
     environment = environments[next(iter(environments))]
     findings, rows = [], []
     meshes = {f"{len(mesh.faces)} triangles": mesh}
@@ -80,14 +78,14 @@ def run(quick: bool, rounds: int) -> Result:
         vertices, faces = bumpy_sphere(LARGE)
         meshes[f"{len(faces)} triangles"] = trimesh.Trimesh(vertices, faces, process=False)
     for name, shape in meshes.items():
-        found, more = ray_rates(name, Points(shape, 4000 if quick else 20000, environment), quick, rounds)
+        found, more = ray_rates(name, SurfacePoints(shape, 4000 if quick else 20000, environment), quick, rounds)
         findings += found
         rows += more
     table = ("Rays a second", ["mesh", "tracer", "Mrays/s", "what is timed"], rows)
     return Result("occlusion", "Occlusion: time against error", SOURCES, findings, charts, [table])
 
 
-def error_charts(light_name: str, points: Points, quick: bool, rounds: int) -> list[Chart]:
+def error_charts(light_name: str, points: SurfacePoints, quick: bool, rounds: int) -> list[Chart]:
     """Charts of the errors of o_d and o_s by rays and by bits, against a reference with many rays."""
     n_true = 1024 if quick else 4096
     true = [torch.stack([points.traced(n_true, n_true, seed)[k] for seed in range(2)]).mean(0) for k in (0, 1)]
@@ -128,7 +126,7 @@ class EnvironmentOf:
         return self.light.filtered(directions, 4 * np.pi * alpha2)
 
 
-def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
+def independent(points: SurfacePoints, n: int) -> tuple[Tensor, Tensor]:
     """Independent cosine-weighted and lobe-weighted rays, traced and summed step by step."""
     count = len(points.positions)
     normals = points.normals[:, None]
@@ -144,7 +142,7 @@ def independent(points: Points, n: int) -> tuple[Tensor, Tensor]:
     return factors[0], factors[1]
 
 
-def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
+def ray_rates(name: str, points: SurfacePoints, quick: bool, rounds: int) -> tuple[list[str], list[list[object]]]:
     """Mrays/s of our factors, with the making and summing of rays, beside tracers that get rays of the same lobes."""
     n, half = len(points.positions), preset("cpu").constants.occlusion_rays
     cosine = F.normalize(points.normals[:, None] + F.normalize(torch.randn(n, half, 3), dim=-1), dim=-1)
@@ -172,7 +170,7 @@ def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list
     above = float(((directions.view(n, -1, 3) * points.normals[:, None]).sum(-1) > 0).float().mean())
     what = {ours: "rays made in the lattice's order, those above the horizon traced and counted, weighed and summed"}
     rows = [
-        [name, call, f"{(above if call == ours else 1) * len(origins) / times[call].seconds / 1e6:.1f}",
+        [name, call, f"{(above if call == ours else 1) * len(origins) / times[call].median / 1e6:.1f}",
          what.get(call, "tracing of given rays, independent of one another")]
         for call in calls
     ]  # fmt: skip
@@ -180,13 +178,13 @@ def ray_rates(name: str, points: Points, quick: bool, rounds: int) -> tuple[list
     for call in (c for c in calls if "splitnerf" not in c):
         ratio = times.ratio(call, ours)
         findings.append(
-            f"{name}: {above * ratio.value:.2f}x ({above * ratio.low:.2f} to {above * ratio.high:.2f}) as many rays a second "
+            f"{name}: {above * ratio.median:.2f}x ({above * ratio.low:.2f} to {above * ratio.high:.2f}) as many rays a second "
             f"as {call}"
         )
     return findings, rows
 
 
-def open3d_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+def open3d_tracer(points: SurfacePoints, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
     open3d = peer("open3d", "its tracer")
     if open3d is None:
         return None
@@ -196,7 +194,7 @@ def open3d_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callab
     return lambda: scene.test_occlusions(rays, nthreads=torch.get_num_threads()).numpy()
 
 
-def embreex_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+def embreex_tracer(points: SurfacePoints, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
     if peer("embreex", "trimesh's tracer") is None:
         return None
     mesh = trimesh.Trimesh(points.vertices.numpy(), points.faces.numpy(), process=False)
@@ -204,7 +202,7 @@ def embreex_tracer(points: Points, origins: Tensor, directions: Tensor) -> Calla
     return lambda: mesh.ray.intersects_any(o, d)
 
 
-def mitsuba_tracer(points: Points, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
+def mitsuba_tracer(points: SurfacePoints, origins: Tensor, directions: Tensor) -> Callable[[], np.ndarray] | None:
     mitsuba = peer("mitsuba", "its tracer")
     if mitsuba is None or not drjit_ready():
         return None

@@ -18,11 +18,9 @@ from splitnerf import _core
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
 from splitnerf_tools.bench.charts import Result
-from splitnerf_tools.bench.harness import Timing, chart_of, check, interleaved, rms
-from splitnerf_tools.bench.lights import data_folder, lights
-from splitnerf_tools.bench.meshes import bumpy_sphere
-from splitnerf_tools.bench.peers import drjit_ready, peer
-from splitnerf_tools.synth.cameras import orbit
+from splitnerf_tools.bench.harness import Quartiles, chart_of, check, interleaved, rms
+from splitnerf_tools.bench.subjects import bumpy_sphere, data_folder, drjit_ready, lights, peer
+from splitnerf_tools.synth.orbits import orbit
 
 SCATTERINGS = 5
 ANGLE_X = 0.69  # radians
@@ -67,7 +65,7 @@ def run(quick: bool, rounds: int) -> Result:
         for way, render in renderers.items() for n in samples
     }  # fmt: skip
     # One renderer after the other: Mitsuba's variants are switched for the whole process, which takes time.
-    times: dict[tuple[str, str], Timing] = {}
+    times: dict[tuple[str, str], Quartiles] = {}
     for way, render in renderers.items():
         calls = {(way, f"{n} spp"): lambda n=n, r=render: r(n, SEEDS) for n in samples}
         found = interleaved(calls, max(3, rounds // 3))
@@ -75,11 +73,11 @@ def run(quick: bool, rounds: int) -> Result:
     most = samples[-1]
     for way in (w for w in renderers if w != "splitnerf"):
         ours, theirs = (
-            [(times[key].seconds, error) for key, error in errors.items() if key[0] == w] for w in ("splitnerf", way)
+            [(times[key].median, error) for key, error in errors.items() if key[0] == w] for w in ("splitnerf", way)
         )
         ratio = time_to(theirs, ours[-1][1]) / ours[-1][0]
         findings.append(f"{way} takes {ratio:.2f}x the time of splitnerf to the error that this has at {most} spp")
-    paths = most * size * size / times["splitnerf", f"{most} spp"].seconds
+    paths = most * size * size / times["splitnerf", f"{most} spp"].median
     findings.insert(0, f"{paths / 1e6:.2f} M paths a second of up to {SCATTERINGS} scattering events")
     title = f"{asset.name}, {name} light, {size} x {size}"
     chart = chart_of(title, "s", "RMS error of radiance", times, errors, {("splitnerf", "64 spp")}, scale=1)

@@ -21,7 +21,7 @@ from splitnerf.ops import (
 )
 from splitnerf_tools.bench.charts import Chart, Result
 from splitnerf_tools.bench.harness import chart_of, interleaved
-from splitnerf_tools.bench.lights import MapLight, cell_means, lights, pyramid_of
+from splitnerf_tools.bench.subjects import MapLight, cell_means, lights, pyramid_of
 
 BANDS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 QUICK_BANDS = (0.1, 0.3, 0.7)

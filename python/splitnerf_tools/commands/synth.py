@@ -49,24 +49,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
         "only these and stanford-orb take --relight",
     )  # fmt: skip
-    parser.add_argument(
-        "--renderer",
-        choices=["project", "blender"],
-        default="project",
-        help="the built-in path tracer (default), or Cycles through bpy",
-    )
     parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.export.glb import write_glb
-    from splitnerf_tools.synth.jobs import SynthSettings, synthesise
+    from splitnerf_tools.synth.rendering import SynthSettings, synthesise
     from splitnerf_tools.synth.shapes import shape_asset
 
     if args.material and not args.shape:
         raise InputError("--material is that of a built-in shape; give --shape, or leave it out")
-    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.renderer, args.seed)
+    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.seed)
     with tempfile.TemporaryDirectory() as folder:
         asset = args.asset
         if args.shape:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from splitnerf_tools.synth.cameras import direction, orbit, spiral
+from splitnerf_tools.synth.orbits import direction, orbit, spiral
 from splitnerf_tools.synth.writer import SceneWriter
 
 CAMERA_DISTANCE = 3.0

@@ -1,5 +1,5 @@
 """Writes rendered views as a dataset, in the layouts that hold full truth; all others are in
-:mod:`splitnerf_tools.synth.layouts`.
+:mod:`splitnerf_tools.synth.published`.
 
 Layouts:
     blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
@@ -14,8 +14,8 @@ the albedo of nerfactor and tensoir is linear), normals world space without the 
 
 from __future__ import annotations
 
+import abc
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -29,35 +29,15 @@ FULL_TRUTH = ("blender", "nerfactor", "tensoir")
 Maps = dict[str, np.ndarray]
 
 
-class Writer(Protocol):
-    """The interface of a layout's class, see :class:`SceneWriter`; `close` writes the files that name the views, last.
-
-    Attributes:
-        root: The folder to train on.
-        relights: Whether the layout has images under other lights.
-    """
-
-    root: Path
-    relights: bool
-
-    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray: ...
-
-    def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None: ...
-
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None: ...
-
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class SceneWriter:
+class ViewWriter(abc.ABC):
     """Takes the renderings of one scene; the files that name the views are written last, by `close`.
 
     Args:
-        out: The dataset's folder; made where it is missing.
+        root: The folder to train on; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
-        layout: One of `FULL_TRUTH`.
+
+    Attributes:
+        relights: Whether the layout has images under other lights.
 
     Raises:
         OSError: A file cannot be written (any method).
@@ -65,10 +45,8 @@ class SceneWriter:
 
     relights = True
 
-    def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
-        self.root = Path(out)
-        self.out, self.camera_angle_x, self.layout = Path(out), camera_angle_x, layout
-        self._views: dict[str, list[tuple[Path, dict]]] = {}
+    def __init__(self, root: Path, camera_angle_x: float):
+        self.root, self.camera_angle_x = Path(root), camera_angle_x
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
         """Writes an environment map.
@@ -80,14 +58,15 @@ class SceneWriter:
         Returns:
             The map as the file holds it, to render with.
         """
-        path = self.out / ("light.hdr" if name is None else f"{PREFIX}{name}.hdr")
+        path = self.root / ("light.hdr" if name is None else f"{PREFIX}{name}.hdr")
         write_image(path, environment)
         return read_radiance(path)
 
     def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
         """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""
-        write_mesh_ply(self.out / "mesh.ply", vertices, triangles)
+        write_mesh_ply(self.root / "mesh.ply", vertices, triangles)
 
+    @abc.abstractmethod
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         """Writes a photo, and the truth of test views.
 
@@ -98,6 +77,30 @@ class SceneWriter:
             maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; where truth is written also `albedo`,
                 `roughness`, `metallic` and `smooth_normal`.
         """
+
+    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
+        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """Writes the poses, which complete the dataset."""
+
+
+class SceneWriter(ViewWriter):
+    """A writer of a layout with full truth.
+
+    Args:
+        out: The dataset's folder; made where it is missing.
+        camera_angle_x: See :class:`ViewWriter`.
+        layout: One of `FULL_TRUTH`.
+    """
+
+    def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
+        super().__init__(out, camera_angle_x)
+        self.layout = layout
+        self._views: dict[str, list[tuple[Path, dict]]] = {}
+
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         image = self._image_path(split, index)
         write_image(image, straight_rgba(maps))
         height, width = maps["alpha"].shape
@@ -111,23 +114,21 @@ class SceneWriter:
             self._write_truth(image, maps)
 
     def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
         write_image(relit_path(self._image_path(split, index), name), straight_rgba(maps))
 
     def close(self) -> None:
-        """Writes the poses, which complete the dataset."""
         for split, views in self._views.items():
             if self.layout == "blender":
                 content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}
-                write_json(self.out / f"transforms_{split}.json", content)
+                write_json(self.root / f"transforms_{split}.json", content)
                 continue
             for image, entry in views:
                 write_json(image.with_name(view_folders.METADATA), entry)
 
     def _image_path(self, split: str, index: int) -> Path:
         if self.layout == "blender":
-            return self.out / split / f"r_{index:03d}.png"
-        return self.out / f"{split}_{index:03d}" / view_folders.PHOTO
+            return self.root / split / f"r_{index:03d}.png"
+        return self.root / f"{split}_{index:03d}" / view_folders.PHOTO
 
     def _write_truth(self, image: Path, maps: Maps) -> None:
         alpha, normal = maps["alpha"][..., None], maps["smooth_normal"]

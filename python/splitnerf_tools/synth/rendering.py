@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from tqdm import tqdm
@@ -19,25 +19,23 @@ from splitnerf.errors import InputError
 from splitnerf.files import LOCK, locked
 from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
-from splitnerf_tools.synth.cameras import orbit, spiral
-from splitnerf_tools.synth.layouts import LAYOUTS, WRITERS
+from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.placement import write_placed_glb
-from splitnerf_tools.synth.writer import Writer
+from splitnerf_tools.synth.published import NeusWriter, ShinyWriter, StanfordOrbWriter
+from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter, ViewWriter
 
-RENDERERS = ("project", "blender")
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
 CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
 TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
 MAP_SIZE = (256, 512)
 
 
-class ViewRenderer(Protocol):
-    """The interface of renderers: :class:`splitnerf.render.path_traced.AssetRenderer`, or Blender."""
-
-    def render(
-        self, environment: np.ndarray, pose: np.ndarray, intrinsics: tuple[float, float, float, float],
-        width: int, height: int, *, spp: int, seed: int,
-    ) -> dict[str, np.ndarray]: ...  # fmt: skip
+WRITERS = {name: partial(SceneWriter, layout=name) for name in FULL_TRUTH} | {
+    "shiny": ShinyWriter,
+    "stanford-orb": StanfordOrbWriter,
+    "neus": NeusWriter,
+}
+"""By the name that `--layout` takes: called with the folder and the horizontal field of view."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ class SynthSettings:
         train: Number of train views.
         test: Number of test views.
         spp: Paths a pixel.
-        layout: One of :data:`splitnerf_tools.synth.layouts.LAYOUTS`.
-        renderer: "project" for the path tracer, "blender" for Blender's Cycles.
+        layout: A key of :data:`WRITERS`.
         seed: The seed of the renderings and of the first camera's azimuth.
     """
 
@@ -59,7 +56,6 @@ class SynthSettings:
     test: int = 20
     spp: int = 256
     layout: str = "blender"
-    renderer: str = "project"
     seed: int = 0
 
     def check(self) -> None:
@@ -69,9 +65,8 @@ class SynthSettings:
                 raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
         if self.seed < 0:
             raise InputError(f"--seed must not be negative, got {self.seed}")
-        for name, known in (("layout", LAYOUTS), ("renderer", RENDERERS)):
-            if getattr(self, name) not in known:
-                raise InputError(f"--{name} must be one of {', '.join(known)}, got {getattr(self, name)}")
+        if self.layout not in WRITERS:
+            raise InputError(f"--layout must be one of {', '.join(WRITERS)}, got {self.layout}")
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
@@ -92,7 +87,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         The folder to train on: `out`, or one in it where the layout has one.
 
     Raises:
-        InputError: The asset, a map, the folder, the layout or a setting cannot be used, or Blender is missing.
+        InputError: The asset, a map, the folder or a setting cannot be used.
         OSError: A file cannot be written.
     """
     settings.check()
@@ -101,7 +96,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     names = [path.stem.removeprefix(PREFIX) for path in relight]
     if len(set(names)) < len(names):
         raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
-    writer: Writer = WRITERS[settings.layout](out, CAMERA_ANGLE_X)
+    writer: ViewWriter = WRITERS[settings.layout](out, CAMERA_ANGLE_X)
     if relight and not writer.relights:
         raise InputError(f"--relight: the layout {settings.layout} has no images in other lights; leave it out")
     maps = [resized(read_environment(path)) for path in (light, *relight)]
@@ -109,14 +104,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     if any(any(material.emission) for material in original.materials):
         note(f"{asset}: emits light; left out, the environment is the only light")
     centre, scale = unit_sphere(original)
-    renderer: ViewRenderer
-    if settings.renderer == "blender":
-        from splitnerf_tools.synth.blender import BlenderRenderer
-
-        renderer = BlenderRenderer(asset, centre, scale)
-    else:
-        renderer = AssetRenderer(normalised(original, centre, scale))
-
+    renderer = AssetRenderer(normalised(original, centre, scale))
     with locked(out):
         write_placed_glb(asset, out / "asset.glb", centre, scale)
         writer.mesh((original.vertices - centre) * scale, original.triangles)
@@ -128,11 +116,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
 
 
 def render_views(
-    renderer: ViewRenderer,
-    writer: Writer,
-    light: np.ndarray,
-    relight: dict[str, np.ndarray],
-    settings: SynthSettings,
+    renderer: AssetRenderer, writer: ViewWriter, light: np.ndarray, relight: dict[str, np.ndarray], settings: SynthSettings
 ) -> None:
     """Renders all views and hands them to the writer.
 

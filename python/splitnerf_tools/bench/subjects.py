@@ -1,18 +1,24 @@
-"""Environment maps for measurements, and the same light in the forms that estimators read."""
+"""What benchmarks measure on: environment maps in the forms that estimators read, meshes, and other libraries.
+
+Each library is optional: a missing one is left out, with a note on stderr.
+"""
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 from pathlib import Path
 
 import numpy as np
 import torch
+import trimesh
 from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.environment import read_environment
 from splitnerf.fields import LightPyramid
+from splitnerf.notes import note
 
 # Their brightest ten-thousandth of the sphere sends less than 1 %, 3 % and 57 % of the light.
 MEASURED = {"soft": "blender_courtyard.exr", "medium": "blender_studio.exr", "hard sun": "blender_sunrise.exr"}
@@ -116,3 +122,54 @@ def pyramid_of(light: MapLight, resolution: int) -> LightPyramid:
         pyramid.texels.zero_()
         pyramid.texels[-(resolution**2) :] = torch.log(cells.clamp(min=1e-5))
     return pyramid
+
+
+def armadillo() -> trimesh.Trimesh:
+    """The scan of the data folder in the unit sphere, or a bumpy sphere of as many triangles."""
+    path = data_folder() / "meshes" / "armadillo_ingp.obj"
+    if not path.is_file():
+        return trimesh.Trimesh(*bumpy_sphere(224), process=False)
+    mesh = trimesh.load(path, process=False)
+    mesh.apply_translation(-mesh.bounds.mean(0))
+    mesh.apply_scale(1 / np.linalg.norm(mesh.vertices, axis=1).max())
+    return mesh
+
+
+def bumpy_sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere with bumps of about 2 n^2 triangles: vertices [v, 3] float32, faces [f, 3] int32."""
+    polar, azimuth = np.meshgrid(
+        np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij"
+    )
+    radius = 1 + 0.15 * np.sin(9 * polar) * np.cos(11 * azimuth)
+    vertices = radius[..., None] * np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1
+    )
+    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.int32)
+
+
+def peer(name: str, why: str) -> object | None:
+    """A library, or None with a line on stderr that says what is missing without it."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError) as error:
+        note(f"{name} is not installed ({str(error).splitlines()[0]}): {why} is left out")
+        return None
+
+
+def drjit_ready() -> bool:
+    """Whether Dr.Jit can compile for this processor; it needs an LLVM library, which DRJIT_LIBLLVM_PATH may name."""
+    if peer("drjit", "what Dr.Jit compiles") is None:
+        return False
+    if "DRJIT_LIBLLVM_PATH" not in os.environ:
+        found = sorted(Path("/usr/lib").glob("*/libLLVM-1[6-9].so")) + sorted(Path("/usr/lib").glob("*/libLLVM.so.1*"))
+        if found:
+            os.environ["DRJIT_LIBLLVM_PATH"] = str(found[-1])
+    import drjit
+
+    if drjit.has_backend(drjit.JitBackend.LLVM):
+        return True
+    note("Dr.Jit finds no LLVM library; set DRJIT_LIBLLVM_PATH: what needs it is left out")
+    return False
