@@ -12,7 +12,7 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
 from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
-from splitnerf_tools.ablate.table import Score, csv_table, differences, markdown_table
+from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table
 from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [

@@ -15,8 +15,8 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.reading import Reading
 from splitnerf_tools.inspection.directions import find_upward, largest_gap
-from splitnerf_tools.inspection.findings import Inspection, inspect
-from splitnerf_tools.inspection.views import views_of
+from splitnerf_tools.inspection.checks import Inspection, inspect
+from splitnerf_tools.inspection.reduced_views import views_of
 
 SIZE, COUNT, ALL = 100, 24, Reading("all")
 BALLS = (((0.0, 0.0, 0.0), 0.7), ((0.5, 0.2, 0.3), 0.5), ((-0.1, -0.6, -0.2), 0.4))  # unlike from all sides

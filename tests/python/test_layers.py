@@ -29,6 +29,7 @@ TOOLS = [
     {"commands"},
     {"batch", "bench", "capture", "demo", "inspection", "view"},
     {"ablate", "doctor", "report", "separation", "synth"},
+    {"findings"},
 ]
 LAYERS = {"splitnerf": CORE, "splitnerf_tools": TOOLS}
 Imports = dict[str, set[str]]
@@ -95,5 +96,5 @@ def test_a_planted_import_is_found(imports):
 
 
 def test_a_planted_import_of_a_tool_is_found(imports):
-    planted = {**imports, "splitnerf.workflow": imports["splitnerf.workflow"] | {"splitnerf_tools.view.live"}}
-    assert wrong_way(planted) == ["splitnerf.workflow imports splitnerf_tools.view.live"]
+    planted = {**imports, "splitnerf.workflow": imports["splitnerf.workflow"] | {"splitnerf_tools.view.training_page"}}
+    assert wrong_way(planted) == ["splitnerf.workflow imports splitnerf_tools.view.training_page"]

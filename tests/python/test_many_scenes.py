@@ -20,7 +20,7 @@ from splitnerf.files import LOCK, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import Share, share_of
-from splitnerf_tools.batch.job import Batch, run_batch
+from splitnerf_tools.batch.tasks import BatchPlan, run_batch
 from splitnerf_tools.batch.scenes import Scene, requested_scenes, keep_scenes, known_scenes, markdown, scene_name
 from splitnerf_tools.commands.batch import given_options
 
@@ -328,7 +328,7 @@ def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
     known, rows, notes = known_scenes(tmp_path), [], []
     asked = requested_scenes(known, [Path(data) for data in ends])
     row = lambda scene: rows.append((scene.name, scene.state))  # noqa: E731
-    batch = Batch(tmp_path, known, asked, ["--steps=4"], retries, row, notes.append)
+    batch = BatchPlan(tmp_path, known, asked, ["--steps=4"], retries, row, notes.append)
     ray = PretendRay({data: list(end) for data, end in ends.items()})
     return batch, ray, rows, notes, run_batch(ray, batch, Share(1, 0, 4))
 

@@ -31,7 +31,7 @@ from splitnerf.refinement import fit, job
 from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.refinement.pixels import covered_pixels
-from splitnerf_tools.report.refinement import refinement_section
+from splitnerf_tools.report.sections import refinement_section
 
 REFINED = ("--set", "refinement.enabled=true", "--set", "refinement_sweeps=2")
 DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json")

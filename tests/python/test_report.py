@@ -21,10 +21,10 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.glb import write_glb
 from splitnerf_tools.report import write_report
-from splitnerf_tools.report.asset import fitted
-from splitnerf_tools.report.browser import script_json
-from splitnerf_tools.report.curves import curve_data, line_chart
-from splitnerf_tools.report.pictures import data_uri
+from splitnerf_tools.report.sections import fitted
+from splitnerf_tools.report.embedding import script_json
+from splitnerf_tools.report.drawings import curve_data, line_chart
+from splitnerf_tools.report.embedding import data_uri
 import splitnerf_tools.report
 
 REPORT = Path(splitnerf_tools.report.__file__).parent
@@ -249,7 +249,7 @@ def test_textures_of_a_large_glb_are_averaged_down_until_it_fits(glb, tmp_path):
 def test_a_glb_that_does_not_fit_or_cannot_be_read_is_said(tmp_path, glb, monkeypatch):
     content, note = fitted(glb, 1000)
     assert content is None and "too much for this page" in note
-    monkeypatch.setattr("splitnerf_tools.report.asset.MOST_BYTES", 1000)
+    monkeypatch.setattr("splitnerf_tools.report.sections.MOST_BYTES", 1000)
     (tmp_path / "cut.glb").write_bytes(glb.read_bytes()[:500])
     for path, words in ((glb, "too much for this page"), (tmp_path / "cut.glb", "truncated GLB")):
         page, parsed = write(tmp_path, asset=path)

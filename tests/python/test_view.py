@@ -26,14 +26,12 @@ from splitnerf.data.reading import Reading
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
-from splitnerf_tools.view.assets import MOST_DROPPED, ViewedAssets
+from splitnerf_tools.view.assets import MOST_DROPPED, ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.photos import ViewedPhotos
 from splitnerf_tools.view.server import ViewServer
 import splitnerf_tools.view
 
 PAGE = Path(splitnerf_tools.view.__file__).parent
-SOURCES = PAGE.parent / "pages"
 
 
 # ---- what is served ----
@@ -188,7 +186,7 @@ def test_photos_are_served_with_their_cameras(shown_run, data):
 
 
 def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, tmp_path, monkeypatch):
-    monkeypatch.setattr("splitnerf_tools.view.photos.LARGEST", 10)
+    monkeypatch.setattr("splitnerf_tools.view.assets.LARGEST", 10)
     with serving(shown_run, photos=ViewedPhotos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
@@ -368,4 +366,3 @@ def test_a_signal_ends_it_in_peace(shown_run, number):
         assert process.stderr.read() == ""
 
 
-# ---- the page ----

@@ -69,8 +69,7 @@ def test_a_connection_without_a_token_is_closed_soon(shown_run, monkeypatch):
 def test_a_page_that_goes_ends_its_request(shown_run, monkeypatch):
     """Whatever the number of its file is, which select() refuses above 1023."""
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
-    if hasattr(select, "poll"):
-        monkeypatch.setattr(select, "select", lambda *_: pytest.fail("select() was called"))
+    monkeypatch.setattr(select, "select", lambda *_: pytest.fail("select() was called"))
     with serving(shown_run) as server:
         with asking_for_pictures(server, **camera_of(16, 16)):
             assert server._open == 1

@@ -19,8 +19,7 @@ from splitnerf.data.images import area_average, linear_to_srgb, read_image, writ
 from splitnerf.export.glb import write_glb
 from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf_tools.view.assets import ViewedAssets
-from splitnerf_tools.view.photos import ViewedPhotos
+from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.server import ViewServer
 
 SIZE = 160

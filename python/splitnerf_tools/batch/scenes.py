@@ -23,6 +23,7 @@ COLUMNS = (
     ("albedo", ("albedo", "psnr"), "{:.2f}"), ("normals", ("normal_mae_deg",), "{:.1f}"),
     ("light", ("light_psnr",), "{:.2f}"),
 )  # fmt: skip
+HEAD = ["state", "steps", "minutes", *(title for title, *_ in COLUMNS)]
 UNITS = "PSNR in dB, normals in degrees"
 
 
@@ -117,30 +118,18 @@ def keep_scenes(out: Path, scenes: Sequence[Scene]) -> None:
         temporary.write_text(markdown(scenes), encoding="utf-8", errors="backslashreplace")
 
 
-class Rows:
-    """The rows of the terminal, as wide as these scenes need it."""
-
-    def __init__(self, scenes: Sequence[Scene]):
-        self._width = max([5, *(min(len(scene.name), LONGEST) for scene in scenes)])
-
-    def head(self) -> str:
-        return self._row("scene", ["state", "steps", "minutes", *(title for title, *_ in COLUMNS)])
-
-    def row(self, scene: Scene) -> str:
-        """A scene's row; the reason of a failure replaces its scores."""
-        name = scene.name if len(scene.name) <= LONGEST else scene.name[: LONGEST - 1] + "~"
-        if scene.state == DONE or not scene.error:
-            return self._row(name, scene.cells())
-        return f"{self._row(name, scene.cells()[:3])}  {plain(scene.error)}"
-
-    def _row(self, name: str, values: list[str]) -> str:
-        return f"{name:{self._width}}  {values[0]:8}" + "".join(f"{value:>8}" for value in values[1:])
+def terminal_row(scene: Scene | None = None) -> str:
+    """A scene's row on the terminal, the reason of a failure in place of its scores; None: the titles."""
+    name, cells, reason = ("scene", HEAD, "") if scene is None else (scene.name, scene.cells(), "")
+    if scene is not None and scene.state != DONE and scene.error:
+        cells, reason = cells[:3], f"  {plain(scene.error)}"
+    name = name if len(name) <= LONGEST else name[: LONGEST - 1] + "~"
+    return f"{name:{LONGEST}}  {cells[0]:8}" + "".join(f"{cell:>8}" for cell in cells[1:]) + reason
 
 
 def markdown(scenes: Sequence[Scene]) -> str:
     """The table of all scenes, with links to the reports of those that are done."""
-    head = ["scene", "state", "steps", "minutes", *(title for title, *_ in COLUMNS), "error", "data"]
-    lines = [head, ["---", "---", *["---:"] * (2 + len(COLUMNS)), "---", "---"]]
+    lines = [["scene", *HEAD, "error", "data"], ["---", "---", *["---:"] * (2 + len(COLUMNS)), "---", "---"]]
     for scene in scenes:
         name = f"[{scene.name}]({scene.name}/report.html)" if scene.state == DONE else scene.name
         lines.append([name, *scene.cells(), _cell(scene.error), _cell(scene.data)])

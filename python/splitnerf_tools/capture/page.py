@@ -9,9 +9,8 @@ from markupsafe import Markup
 from PIL import Image
 
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World
-from splitnerf_tools.report.page import write_html
-from splitnerf_tools.report.pictures import photo_uri
-from splitnerf_tools.report.plans import plan
+from splitnerf_tools.report.drawings import plan
+from splitnerf_tools.report.embedding import photo_uri, write_html
 
 PICTURE_WIDTH = 240  # pixels
 OUTSIDE = 0.3  # brightness of what a mask leaves out

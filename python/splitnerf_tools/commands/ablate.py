@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
     from splitnerf.evaluate.jobs import Protocol
     from splitnerf.files import atomic_path, locked
-    from splitnerf_tools.ablate.job import Interrupted, Plan, ablate
-    from splitnerf_tools.ablate.table import csv_table, markdown_table
+    from splitnerf_tools.ablate.runs import AblationPlan, Interrupted, ablate
+    from splitnerf_tools.ablate.scores import csv_table, markdown_table
 
     scenes = {scene.resolve().name: scene for scene in args.data}
     if len(scenes) < len(args.data):
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
             with atomic_path(args.out / name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
-    plan = Plan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
+    plan = AblationPlan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
     refuse_data(args.out)
     try:
         with locked(args.out):

@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
     from splitnerf.files import locked
     from splitnerf_tools.batch.cluster import machines_of, ray_on, share_of
-    from splitnerf_tools.batch.job import Batch, run_batch
-    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, Rows, requested_scenes, known_scenes
+    from splitnerf_tools.batch.tasks import BatchPlan, run_batch
+    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, known_scenes, requested_scenes, terminal_row
     from splitnerf_tools.batch.scenes import DONE as SCENE_DONE
 
     check_usage(args)
@@ -62,22 +62,22 @@ def run(args: argparse.Namespace) -> int:
     with locked(args.out):
         known = known_scenes(args.out)
         requested = requested_scenes(known, args.scenes)
-        rows, out, err = Rows(requested), sys.stdout, sys.stderr  # Ray's output goes elsewhere, see ray_on
+        out, err = sys.stdout, sys.stderr  # Ray's output goes elsewhere, see ray_on
 
         def note(text: str) -> None:
             print(f"splitnerf: note: {escaped(text)}", file=err, flush=True)
 
         def row(scene: Scene) -> None:
-            print(escaped(rows.row(scene)), file=out, flush=True)
+            print(escaped(terminal_row(scene)), file=out, flush=True)
 
-        batch = Batch(args.out, known, requested, given_options(args), args.retries, row, note)
+        batch = BatchPlan(args.out, known, requested, given_options(args), args.retries, row, note)
         with ray_on(args.address, args.out) as ray:
             share = share_of(
                 machines_of(ray), len(requested), cores=args.cores_per_scene, gpus=args.gpus_per_scene,
                 memory=args.memory_per_scene, photos=args.max_memory, whole_gpu=args.preset == "paper",
             )  # fmt: skip
             note(f"{len(requested)} scenes, {share} each")
-            print(rows.head(), file=out, flush=True)
+            print(terminal_row(), file=out, flush=True)
             all_ended = run_batch(ray, batch, share)
     counts = Counter(scene.state for scene in requested)
     print(f"{', '.join(f'{count} {state}' for state, count in counts.items())} ({UNITS}); table: {args.out / TABLE}")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import splitnerf
 from splitnerf.cli.exit_codes import DONE, FAILED
-from splitnerf_tools.commands.findings import show
+from splitnerf_tools.findings import show
 
 INSTALL_AGAIN = "install it again: pip install --force-reinstall --no-deps --no-build-isolation ."
 
@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         return FAILED
     failed = False
     for finding in findings(Path.cwd()):
-        show(finding.name, finding.value, [finding.advice] if finding.advice else [])
+        finding.show()
         failed |= finding.failed
     for device in devices():
         failed |= not self_test(device)

@@ -9,7 +9,6 @@ from splitnerf.cli.exit_codes import DONE
 from splitnerf.cli.help import examples
 from splitnerf.cli.reading import add_reading_options, reading_of
 from splitnerf.errors import InputError
-from splitnerf_tools.commands.findings import show
 
 PAGE = "inspect.html"
 
@@ -34,8 +33,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.workflow import load_splits
-    from splitnerf_tools.inspection.findings import inspect
-    from splitnerf_tools.inspection.page import write_page
+    from splitnerf_tools.inspection.checks import inspect
+    from splitnerf_tools.inspection.inspect_page import write_page
 
     page = args.out / PAGE if args.out.is_dir() else args.out
     if page.suffix.lower() not in (".html", ".htm"):
@@ -43,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     reading = reading_of(args, args.data)
     found = inspect(*load_splits(args.data, args.downscale, reading), reading)
     for finding in found.findings:
-        show(finding.name, finding.value, [finding.advice] if finding.advice else [])
+        finding.show()
     write_page(page, found)
     print(f"look at {page}")
     return DONE

@@ -36,9 +36,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf_tools.view.photos import ViewedPhotos
+    from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
     from splitnerf_tools.view.server import ViewServer
-    from splitnerf_tools.view.assets import ViewedAssets
 
     if not 0 <= args.port < 1 << 16:
         raise InputError(f"--port must lie between 0 and 65535, got {args.port}")

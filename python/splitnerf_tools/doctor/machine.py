@@ -16,6 +16,7 @@ from splitnerf import _core
 from splitnerf.devices import devices, refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.memory import SHARE_OF_PHOTOS, control_group, memory_bytes
+from splitnerf_tools.findings import Finding
 
 INSTALL = "pip install --no-build-isolation ."
 ISAS = ("base", "avx2", "avx512")  # each holds those before it
@@ -42,24 +43,7 @@ PACKAGES = (
     Package("ray", "ray", "batch", "many scenes, in batch"),
     Package("tensorboard", "tensorboard", "tensorboard", "TensorBoard's files, in train"),
     Package("lpips", "lpips", "lpips", "LPIPS scores, in evaluate"),
-    Package("bpy", "bpy", "blender", "--renderer blender, in synth"),
 )
-
-
-class Finding(NamedTuple):
-    """One line of the list.
-
-    Attributes:
-        name: What was looked at.
-        value: What was found.
-        advice: What to do about it; empty where nothing needs to be done.
-        failed: Whether a part of the program cannot work.
-    """
-
-    name: str
-    value: str
-    advice: str = ""
-    failed: bool = False
 
 
 def findings(folder: Path) -> list[Finding]:

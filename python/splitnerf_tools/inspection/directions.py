@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from splitnerf_tools.inspection.views import View
+from splitnerf_tools.inspection.reduced_views import ReducedView
 
 LEVEL = 0.1  # mean square of the sideways axes along upward, beyond which cameras are rolled and do not tell upward
 POLE = 75.0  # degrees of elevation, up or down, from which on a camera is on no side
 NEAR_AXIS = 10.0  # degrees between upward and the data's z axis that count as none
 
 
-def angles(views: Sequence[View], centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def angles(views: Sequence[ReducedView], centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Azimuths [n] in (-180, 180] and elevations [n] of the cameras seen from a point [3], degrees, and upward [3]."""
     upward = find_upward(np.stack([view.pose for view in views]))
     x, y = horizontal_axes(upward)

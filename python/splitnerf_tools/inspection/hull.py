@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from splitnerf.data.normalisation import MaskView, cell_centres
-from splitnerf_tools.inspection.views import View
+from splitnerf_tools.inspection.reduced_views import ReducedView
 
 REACH = 3.0  # half edge of the box that is searched, in the internal frame, where the object's radius is about 1
 COARSE, MIDDLE, SPLIT = 32, 24, 3  # cells along the box, then along what is left of it, then along each of these cells
@@ -55,7 +55,7 @@ class Fit:
         return float(np.linalg.norm(self.cells - self.centre, axis=1).max() + self.cell / 2)
 
 
-def fit_masks(views: Sequence[View]) -> Fit | None:
+def fit_masks(views: Sequence[ReducedView]) -> Fit | None:
     """Compares masks and poses; None where the masks have no hull.
 
     A first hull is where three quarters of the photos see the object: of all photos, or of the first or second half
@@ -86,7 +86,7 @@ def fit_masks(views: Sequence[View]) -> Fit | None:
 class _Votes:
     """What each mask says of each cell near the object."""
 
-    def __init__(self, views: Sequence[View]):
+    def __init__(self, views: Sequence[ReducedView]):
         self.views = views
         self.masks = [MaskView.of(view.mask, view.pose, view.intrinsics, view.known) for view in views]
         half, centre = np.full(3, REACH), np.zeros(3)
@@ -123,17 +123,11 @@ class _Votes:
         """[h, w] bool, what a view shows of chosen cells."""
         view = self.views[index]
         filled = np.zeros(view.mask.shape, bool)
-        local = (self.cells[chosen] - view.place) @ view.pose[:3, :3]
-        local = local[-local[:, 2] > self.cell]
-        if len(local) == 0:
+        _, y, x, depth = view.shown(self.cells[chosen], self.cell)
+        if len(depth) == 0:
             return filled
-        fx, fy, cx, cy = view.intrinsics
-        depth = -local[:, 2]
-        x, y = np.floor(cx + fx * local[:, 0] / depth), np.floor(cy - fy * local[:, 1] / depth)
-        height, width = filled.shape
-        within = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-        filled[y[within].astype(int), x[within].astype(int)] = True
-        footprint = 2 * round(fx * self.cell / float(np.median(depth)) / 2) + 1  # odd, about a cell's width
+        filled[y, x] = True
+        footprint = 2 * round(view.intrinsics[0] * self.cell / float(np.median(depth)) / 2) + 1  # odd, about a cell's width
         return ndimage.binary_dilation(filled, np.ones((footprint, footprint))) & view.known
 
     def agreement(self, members: np.ndarray, share: float) -> np.ndarray:
@@ -142,7 +136,7 @@ class _Votes:
         return np.array([_overlap(view, self.outline(i, chosen)) for i, view in enumerate(self.views)])
 
 
-def _overlap(view: View, outline: np.ndarray) -> float:
+def _overlap(view: ReducedView, outline: np.ndarray) -> float:
     """The intersection over union of a view's mask and an outline; 1 where both are empty."""
     union = (view.mask | outline).sum()
     return float((view.mask & outline).sum() / union) if union else 1.0

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from splitnerf.data.images import srgb_to_linear
 from splitnerf_tools.inspection.hull import Fit
-from splitnerf_tools.inspection.views import View
+from splitnerf_tools.inspection.reduced_views import ReducedView
 
 SAME_ANGLE, SAME_PLACE = 0.05, 1e-3  # degrees and object's radii by which one pose differs
 COPIES, OTHER_POSES, ONE_POSE = "one photo twice", "one photo, two poses", "two photos, one pose"
@@ -21,7 +21,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 DARKEST = 1e-3  # of the linear values that count
 
 
-def duplicates(views: Sequence[View], radius: float) -> list[tuple[int, int, str]]:
+def duplicates(views: Sequence[ReducedView], radius: float) -> list[tuple[int, int, str]]:
     """Pairs of photos, i < j, of which at most one can be right, and what they are: one file, or one pose.
 
     Args:
@@ -39,7 +39,7 @@ def duplicates(views: Sequence[View], radius: float) -> list[tuple[int, int, str
     return [(i, j, kinds[bool(one_file[i, j]), bool(one_pose[i, j])]) for i, j in pairs]
 
 
-def differences(views: Sequence[View], fit: Fit) -> np.ndarray:
+def differences(views: Sequence[ReducedView], fit: Fit) -> np.ndarray:
     """[n] by how many powers of two each photo is brighter than its neighbours in direction, NaN where it has none.
 
     Two photos are compared where both show a cell of the hull's surface, by the median of the ratios there; a photo's
@@ -66,20 +66,15 @@ def _surface(fit: Fit) -> np.ndarray:
     return fit.cells[tree.query_ball_point(fit.cells, 1.1 * fit.cell, return_length=True) < 7]
 
 
-def _seen_values(view: View, cells: np.ndarray, cell: float) -> np.ndarray:
+def _seen_values(view: ReducedView, cells: np.ndarray, cell: float) -> np.ndarray:
     """[m] the logarithm, base 2, of the luminance at which a view shows cells; NaN where it does not."""
     values = np.full(len(cells), np.nan)
-    local = (cells - view.place) @ view.pose[:3, :3]
-    depth = np.maximum(-local[:, 2], 1e-6)
-    fx, fy, cx, cy = view.intrinsics
-    x, y = np.floor(cx + fx * local[:, 0] / depth), np.floor(cy - fy * local[:, 1] / depth)
+    numbers, y, x, depth = view.shown(cells, cell)
+    step = max(1, round(1.5 * view.intrinsics[0] * cell / float(np.median(depth)))) if len(numbers) else 1
     height, width = view.mask.shape
-    shown = np.flatnonzero((-local[:, 2] > cell) & (x >= 0) & (x < width) & (y >= 0) & (y < height))
-    x, y, depth = x[shown].astype(int), y[shown].astype(int), depth[shown]
-    step = max(1, round(1.5 * fx * cell / float(np.median(depth)))) if len(shown) else 1
     first = np.full((height // step + 1, width // step + 1), np.inf)
     np.minimum.at(first, (y // step, x // step), depth)
     visible = (depth <= first[y // step, x // step] + BEHIND * cell) & view.mask[y, x]
     luminance = srgb_to_linear(view.colour[y[visible], x[visible]]) @ LUMINANCE
-    values[shown[visible]] = np.where(luminance > DARKEST, np.log2(np.maximum(luminance, DARKEST)), np.nan)
+    values[numbers[visible]] = np.where(luminance > DARKEST, np.log2(np.maximum(luminance, DARKEST)), np.nan)
     return values

@@ -11,13 +11,10 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from splitnerf_tools.report.asset import asset_section
-from splitnerf_tools.report.browser import script_json
-from splitnerf_tools.report.curves import PALETTE, curve_data, line_chart
-from splitnerf_tools.report.refinement import refinement_section
-from splitnerf_tools.report.light import embedded_light, panels_section
-from splitnerf_tools.report.page import write_html
-from splitnerf_tools.report.views import views_section
+from splitnerf_tools.report.drawings import PALETTE, curve_data, line_chart
+from splitnerf_tools.report.embedding import script_json, write_html
+from splitnerf_tools.report.sections import asset_section, embedded_light, panels_section, refinement_section, views_section
+
 
 def write_report(
     path: str | os.PathLike,
@@ -50,7 +47,7 @@ def write_report(
         light_truth: [h, w, 3] linear radiance, or None.
         history: Lines of `metrics.jsonl`: `step`, `loss`, `psnr`, `loss_*`; each but `step` optional.
         timings: Seconds by part of the run.
-        refinement: What the refinement changed, see :func:`splitnerf_tools.report.refinement.refinement_section`; None without one.
+        refinement: What the refinement changed, see :func:`splitnerf_tools.report.sections.refinement_section`; None without one.
         light: [h, w, 3] linear radiance that is delivered, or None.
         asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
         albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.

@@ -1,4 +1,4 @@
-"""The assets and lights that the viewer shows."""
+"""What the viewer shows: assets, lights, and the photos of a run."""
 
 from __future__ import annotations
 
@@ -6,22 +6,28 @@ import functools
 import tempfile
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import TypeVar
 
 import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.frames import read_frames
 from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import encode_image
+from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.photos import check_files, load_photo
+from splitnerf.data.pixels import decoded
+from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, plain
+from splitnerf.files import reason
 from splitnerf.notes import note
-from splitnerf_tools.report.browser import camera_of
+from splitnerf_tools.report.embedding import camera_of
 
 MOST_ROWS = 1024  # of a light
+LARGEST = 1600  # pixels of a photo's longer side in the page
 MOST_DROPPED = 8  # lights that were dropped onto the page; an older one is forgotten
-Read = TypeVar("Read")
 
 
 @dataclass(frozen=True)
@@ -154,22 +160,14 @@ class ViewedAssets:
         content = glb.read_bytes()
         if not content.startswith(b"glTF"):
             raise InputError(f"{glb}: is a .gltf, whose parts the page cannot load; export it as GLB")
-        name, own = name or run_name(glb), None
-        if glb.name == "mesh.glb":
-            beside = glb.with_name("environment.exr")
-            own = self._beside(beside, lambda path: self.add_light(light_of(path, f"light of {name}"), light))
+        name, own, environment = name or run_name(glb), None, glb.with_name("environment.exr")
+        if glb.name == "mesh.glb" and environment.exists():
+            try:
+                own = self.add_light(light_of(environment, f"light of {name}"), light)
+            except InputError as error:  # it becomes a line
+                self.problems.append(str(error))
+                note(str(error))
         return Source(name, asset, lambda: content, own)
-
-    def _beside(self, path: Path, read: Callable[[Path], Read]) -> Read | None:
-        """What `read` makes of a file; None where there is none, or where it cannot be read, which becomes a line."""
-        if not path.exists():
-            return None
-        try:
-            return read(path)
-        except InputError as error:
-            self.problems.append(str(error))
-            note(str(error))
-            return None
 
 
 def run_name(glb: Path) -> str:
@@ -186,3 +184,53 @@ def light_of(path: Path, name: str) -> ViewedLight:
     radiance = read_environment(path)
     height = min(radiance.shape[0], MOST_ROWS)
     return ViewedLight(name, resize_environment(radiance, height, 2 * height))
+
+
+class ViewedPhotos:
+    """All photos of a data set, in its order.
+
+    Args:
+        root: The data's folder.
+
+    Raises:
+        InputError: The data cannot be used, or an image is missing.
+    """
+
+    def __init__(self, root: Path):
+        if not root.is_dir():
+            raise InputError(f"{root}: no such folder; give the folder of the data that the run was trained on")
+        frames, _ = read_frames(root, "train", Reading(eval_mode="all"))
+        self._frames = [replace(frame, mask_path=None, dynamic_mask_path=None) for frame in frames]
+        (self.height, self.width), _ = check_files(self._frames, 1)
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def cameras(self) -> list[dict]:
+        """For each photo, for JSON: `name`, `pose` (camera-to-world, row by row, OpenGL axes), `intrinsics` (fx, fy,
+        cx, cy in pixels of the file), `width`, `height`, and `exposure`, the factor of its linear values that the data
+        state."""
+        size = (self.height, self.width)
+        return [
+            {
+                "name": frame.name, "pose": frame.pose.ravel().tolist(), "intrinsics": lens_intrinsics(frame.lens, size).tolist(),
+                "width": self.width, "height": self.height, "exposure": frame.exposure,
+            }
+            for frame in self._frames
+        ]  # fmt: skip
+
+    def png(self, number: int) -> bytes:
+        """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent at invalid pixels.
+
+        Raises:
+            InputError: It cannot be read, or is gone.
+        """
+        frame, factor = self._frames[number], -(-max(self.height, self.width) // LARGEST)
+        try:
+            photo = load_photo(frame, factor, "object")
+        except OSError as error:
+            raise InputError(f"{frame.image_path}: cannot be read ({reason(error)}); is the data's folder still there?") from None
+        rgba = decoded(photo.rgba)
+        if photo.known is not None:
+            rgba[..., 3] *= photo.known
+        return encode_image(np.ascontiguousarray(rgba), ".png", frame.name)

@@ -13,7 +13,7 @@ from splitnerf.data.environment import rotate_environment
 from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
 from splitnerf.render.path_traced import AssetRenderer
-from splitnerf_tools.report.browser import as_halves
+from splitnerf_tools.report.embedding import as_halves
 from splitnerf_tools.view.assets import ViewedAssets
 
 FIRST_SIDE = 256  # pixels of the first picture's longer side

@@ -26,11 +26,10 @@ from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
-from splitnerf_tools.report.browser import as_halves
-from splitnerf_tools.view.assets import Source, ViewedAssets
+from splitnerf_tools.report.embedding import as_halves
+from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.final import Camera, Tracer
-from splitnerf_tools.view.photos import ViewedPhotos
 
 if TYPE_CHECKING:
     from splitnerf_tools.view.live import Live
@@ -190,9 +189,9 @@ class Handler(BaseHTTPRequestHandler):
                 raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
             answers[name](rest)
         except Refused as refused:
-            self._send(json.dumps({"error": str(refused)}).encode(), "application/json", refused.status)
+            self._send_json({"error": str(refused)}, refused.status)
         except InputError as error:
-            self._send(json.dumps({"error": str(error)}).encode(), "application/json", HTTPStatus.UNPROCESSABLE_ENTITY)
+            self._send_json({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     def _checked_path(self) -> str:
         """What follows the token in the path of a request that may be answered."""
@@ -213,7 +212,7 @@ class Handler(BaseHTTPRequestHandler):
         if self.server.live is not None:
             self.server.live.load()
         cameras = [] if self.server.photos is None else self.server.photos.cameras()
-        self._send(json.dumps(self.server.shown.description() | {"cameras": cameras, "training": self.server.live is not None}).encode(), "application/json")
+        self._send_json(self.server.shown.description() | {"cameras": cameras, "training": self.server.live is not None})
 
     def _asset(self, rest: str) -> None:
         source = self._source(rest)
@@ -229,11 +228,11 @@ class Handler(BaseHTTPRequestHandler):
 
     def _curves(self, rest: str) -> None:
         """The lines of the log from a number on."""
-        self._send(json.dumps(self._training().lines(self._number(rest))).encode(), "application/json")
+        self._send_json(self._training().lines(self._number(rest)))
 
     def _control(self, rest: str) -> None:
         self._training().ask(rest)
-        self._send(b"{}", "application/json")
+        self._send_json({})
 
     def _training(self) -> Live:
         if self.server.live is None:
@@ -244,7 +243,8 @@ class Handler(BaseHTTPRequestHandler):
         light = self.server.shown.light(self._number(rest))
         if light is None:
             raise Refused(HTTPStatus.NOT_FOUND, "this light is no longer kept; drop it again")
-        self._send_halves(as_halves(light.radiance))
+        width, height, content = as_halves(light.radiance)
+        self._send(content, "application/octet-stream", Picture_Size=f"{width}x{height}")
 
     def _photo(self, rest: str) -> None:
         number = self._number(rest)
@@ -268,13 +268,9 @@ class Handler(BaseHTTPRequestHandler):
 
     def _is_gone(self) -> bool:
         """Whether the page has closed this connection."""
-        if hasattr(select, "poll"):  # select() refuses numbers of files above 1023
-            asked = select.poll()
-            asked.register(self.connection, select.POLLIN)
-            readable = asked.poll(0)
-        else:
-            readable, _, _ = select.select([self.connection], [], [], 0)
-        return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
+        asked = select.poll()  # select() refuses numbers of files above 1023
+        asked.register(self.connection, select.POLLIN)
+        return bool(asked.poll(0)) and not self.connection.recv(1, socket.MSG_PEEK)
 
     def _dropped(self, rest: str) -> None:
         name = parse_qs(urlsplit(self.path).query).get("name", ["light"])[0]
@@ -282,7 +278,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
         with self.server.uploading:
             number = self.server.shown.drop(name, self._body(LARGEST_UPLOAD))
-        self._send(json.dumps({"number": number}).encode(), "application/json")
+        self._send_json({"number": number})
 
     def _body(self, most: int) -> bytes:
         """The body of a request, of at most so many bytes."""
@@ -307,9 +303,8 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(HTTPStatus.NOT_FOUND, "there is nothing at this address")
         return int(text)
 
-    def _send_halves(self, picture: tuple[int, int, bytes]) -> None:
-        width, height, content = picture
-        self._send(content, "application/octet-stream", Picture_Size=f"{width}x{height}")
+    def _send_json(self, content: object, status: HTTPStatus = HTTPStatus.OK) -> None:
+        self._send(json.dumps(content).encode(), "application/json", status)
 
     def _send(self, content: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, **headers: str) -> None:
         self._send_head(kind, status, Content_Length=str(len(content)), **headers)

@@ -13,11 +13,11 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol
 from splitnerf.workflow import evaluate_run, reconstruct
 from splitnerf_tools.ablate.rows import Row
-from splitnerf_tools.ablate.table import CLOSE, Score, differences, score_of
+from splitnerf_tools.ablate.scores import CLOSE, Score, differences, score_of
 
 
 @dataclass(frozen=True)
-class Plan:
+class AblationPlan:
     """The plan of an ablation.
 
     Attributes:
@@ -39,7 +39,7 @@ class Interrupted(Exception):
     """Ctrl-C ended a training; its state is saved."""
 
 
-def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
+def ablate(plan: AblationPlan, show: Callable[[list[Score]], None]) -> list[Score]:
     """Trains and scores the runs that are not finished yet.
 
     Args:
@@ -69,7 +69,7 @@ def ablate(plan: Plan, show: Callable[[list[Score]], None]) -> list[Score]:
     return scores
 
 
-def run_row(plan: Plan, scene: Path, row: Row, seed: int) -> dict:
+def run_row(plan: AblationPlan, scene: Path, row: Row, seed: int) -> dict:
     """The evaluation of one run; trains it unless it is finished."""
     config = row.config.replace({"run.seed": seed})
     run = plan.out / scene.resolve().name / (row.slug if seed == 0 else f"{row.slug}_seed{seed}")

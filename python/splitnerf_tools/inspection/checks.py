@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.frames import layout_of, split_rule
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+from splitnerf_tools.findings import Finding
 from splitnerf_tools.inspection.directions import angles, largest_gap
 from splitnerf_tools.inspection.hull import Fit, fit_masks
 from splitnerf_tools.inspection.pairs import differences, duplicates
-from splitnerf_tools.inspection.views import View, views_of
+from splitnerf_tools.inspection.reduced_views import ReducedView, views_of
 
 WIDEST_GAP = 120.0  # degrees of azimuth without a camera
 SMALLEST_SHARE, LARGEST_CUT, LARGEST_CLIPPED = 0.05, 0.01, 0.05  # of the photo, of its edge, of the object
@@ -25,23 +26,6 @@ NAMED = 3  # photos in a line
 
 
 @dataclass
-class Finding:
-    """One line of the list.
-
-    Attributes:
-        name: What was looked at.
-        value: What was found.
-        advice: What to do about it; empty where nothing is suspected.
-        suspects: What is suspected of a photo, in a few words, by its number; the worst come first.
-    """
-
-    name: str
-    value: str
-    advice: str = ""
-    suspects: dict[int, str] = field(default_factory=dict)
-
-
-@dataclass
 class Inspection:
     """All that was found.
 
@@ -49,17 +33,14 @@ class Inspection:
         title: The data's name.
         views: The photos, those to train on first.
         fit: The object's hull, and how the masks fit it.
-        azimuth, elevation: [n] degrees, the cameras' directions from the hull's centre.
         upward: [3] unit vector.
         brightness: [n] differences from photos nearby, powers of two; NaN where there is none.
         findings: The lines.
     """
 
     title: str
-    views: list[View]
+    views: list[ReducedView]
     fit: Fit
-    azimuth: np.ndarray
-    elevation: np.ndarray
     upward: np.ndarray
     brightness: np.ndarray
     findings: list[Finding]
@@ -95,7 +76,7 @@ def inspect(train: Dataset, test: Dataset | None, reading: Reading) -> Inspectio
         _brightness(views, brightness),
         _clipped(views),
     ]
-    return Inspection(train.name, views, fit, azimuth, elevation, upward, brightness, findings)
+    return Inspection(train.name, views, fit, upward, brightness, findings)
 
 
 def _layout(train: Dataset, test: Dataset | None, reading: Reading) -> Finding:
@@ -112,7 +93,7 @@ def _sizes(train: Dataset, test: Dataset | None) -> Finding:
     return Finding("size", f"{' and '.join(sorted(sizes))} pixels{reduced}, {_range(across, '.0f')} degrees across")
 
 
-def _distances(views: Sequence[View], fit: Fit, box_from_world: np.ndarray) -> Finding:
+def _distances(views: Sequence[ReducedView], fit: Fit, box_from_world: np.ndarray) -> Finding:
     radii = np.linalg.norm([view.place - fit.centre for view in views], axis=1) / fit.radius
     unit = fit.radius / np.cbrt(np.linalg.det(box_from_world[:3, :3]))
     value = f"{_range(radii, '.3g')} radii of the object; one is {unit:.3g} of the data's units"
@@ -129,26 +110,26 @@ def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> Finding:
     return Finding("directions", value, advice)
 
 
-def _inside(views: Sequence[View], fit: Fit) -> Finding:
+def _inside(views: Sequence[ReducedView], fit: Fit) -> Finding:
     suspects = dict.fromkeys(fit.inside, "camera in the object")
     return _suspicion("cameras in the object", f"{len(suspects) or 'none'}", "check their poses, or leave them out", views, suspects)
 
 
-def _shares(views: Sequence[View]) -> Finding:
+def _shares(views: Sequence[ReducedView]) -> Finding:
     shares = np.array([view.share for view in views])
-    suspects = {int(i): f"object on {shares[i]:.1%}" for i in np.argsort(shares) if shares[i] < SMALLEST_SHARE}
+    suspects = _worst(-shares, -SMALLEST_SHARE, shares, "object on {:.1%}")
     advice = f"the object is small in {len(suspects)}, go nearer or cut them out"
     return _suspicion("masks cover", f"{_range(100 * shares, '.1f')} % of the photo", advice, views, suspects)
 
 
-def _cut(views: Sequence[View]) -> Finding:
+def _cut(views: Sequence[ReducedView]) -> Finding:
     shares = np.array([view.cut for view in views])
-    suspects = {int(i): f"cut, {shares[i]:.0%} of the edge" for i in np.argsort(-shares) if shares[i] > LARGEST_CUT}
+    suspects = _worst(shares, LARGEST_CUT, shares, "cut, {:.0%} of the edge")
     advice = "keep the whole object in most photos, go farther away"
     return _suspicion("cut by the edge", f"{len(suspects) or 'none'}", advice, views, suspects)
 
 
-def _agreement(views: Sequence[View], fit: Fit) -> Finding:
+def _agreement(views: Sequence[ReducedView], fit: Fit) -> Finding:
     suspects = {i: f"mask fits {fit.agreement[i]:.2f}" for i in fit.outliers}
     advice = ""
     if suspects:
@@ -156,10 +137,10 @@ def _agreement(views: Sequence[View], fit: Fit) -> Finding:
     elif len(views) >= ENOUGH and np.median(fit.agreement) < ROUGH:
         advice = "masks and poses fit badly everywhere: are the poses, the lens and the masks those of these photos?"
     value = f"intersection over union with the others' hull {_range(fit.agreement, '.2f')}"
-    return Finding("masks against poses", f"{value}, {len(suspects) or 'no'} outliers", advice, suspects)
+    return Finding("masks against poses", f"{value}, {len(suspects) or 'no'} outliers", advice, suspects=suspects)
 
 
-def _duplicates(views: Sequence[View], fit: Fit) -> Finding:
+def _duplicates(views: Sequence[ReducedView], fit: Fit) -> Finding:
     pairs = duplicates(views, fit.radius)
     suspects: dict[int, str] = {}
     for i, j, what in pairs:
@@ -169,10 +150,10 @@ def _duplicates(views: Sequence[View], fit: Fit) -> Finding:
     value = ", ".join(f"{sum(pair[2] == kind for pair in pairs)} pairs, {kind}" for kind in kinds) or "none"
     listed = [f"{views[i].name} and {views[j].name}" for i, j, _ in pairs]
     advice = f"keep one, or check the poses: {_some(listed)}" if pairs else ""
-    return Finding("duplicate photos", value, advice, suspects)
+    return Finding("duplicate photos", value, advice, suspects=suspects)
 
 
-def _brightness(views: Sequence[View], brightness: np.ndarray) -> Finding:
+def _brightness(views: Sequence[ReducedView], brightness: np.ndarray) -> Finding:
     exposures = np.array([view.exposure for view in views])
     stated = np.ptp(exposures) > 0
     value = f"exposures stated, {_range(exposures, '.2f')}" if stated else "no exposures stated"
@@ -181,7 +162,7 @@ def _brightness(views: Sequence[View], brightness: np.ndarray) -> Finding:
         return Finding("brightness", f"{value}; no two photos are near enough to compare")
     usual = 1.4826 * float(np.median(known))
     sizes, least = np.abs(np.nan_to_num(brightness)), max(OUTLIER, OUTLIER_DEVIATIONS * usual)
-    suspects = {int(i): f"brightness {brightness[i]:+.2f} EV" for i in np.argsort(-sizes) if sizes[i] > least}
+    suspects = _worst(sizes, least, brightness, "brightness {:+.2f} EV")
     value += f"; photos differ from those beside them by {usual:.2g} EV, at most {known.max():.2g}"
     advice = ""
     if usual > UNEVEN:
@@ -189,19 +170,24 @@ def _brightness(views: Sequence[View], brightness: np.ndarray) -> Finding:
         advice = f"the object shines, or {wrong}: give `exposure` in each frame, or use `splitnerf prepare`"
     elif suspects:
         advice = f"exposed otherwise, or the light changed: {_named(views, suspects)}"
-    return Finding("brightness", value, advice, suspects)
+    return Finding("brightness", value, advice, suspects=suspects)
 
 
-def _clipped(views: Sequence[View]) -> Finding:
+def _clipped(views: Sequence[ReducedView]) -> Finding:
     shares = np.array([view.clipped for view in views])
-    suspects = {int(i): f"clipped {shares[i]:.0%}" for i in np.argsort(-shares) if shares[i] > LARGEST_CLIPPED}
+    suspects = _worst(shares, LARGEST_CLIPPED, shares, "clipped {:.0%}")
     value = f"{_range(100 * shares, '.1f')} % of the object's pixels"
     return _suspicion("clipped", value, "expose less, what is clipped has no colour", views, suspects)
 
 
-def _suspicion(name: str, value: str, advice: str, views: Sequence[View], suspects: dict[int, str]) -> Finding:
+def _worst(sizes: np.ndarray, least: float, values: np.ndarray, words: str) -> dict[int, str]:
+    """The photos whose size is above the least one, the largest first, with their values in words."""
+    return {int(i): words.format(values[i]) for i in np.argsort(-sizes) if sizes[i] > least}
+
+
+def _suspicion(name: str, value: str, advice: str, views: Sequence[ReducedView], suspects: dict[int, str]) -> Finding:
     """A finding whose advice, if photos are suspected, ends with their names."""
-    return Finding(name, value, f"{advice}: {_named(views, suspects)}" if suspects else "", suspects)
+    return Finding(name, value, f"{advice}: {_named(views, suspects)}" if suspects else "", suspects=suspects)
 
 
 def _range(values: np.ndarray, form: str) -> str:
@@ -210,7 +196,7 @@ def _range(values: np.ndarray, form: str) -> str:
     return low if low == high else f"{low} to {high} (median {middle})"
 
 
-def _named(views: Sequence[View], suspects: Iterable[int]) -> str:
+def _named(views: Sequence[ReducedView], suspects: Iterable[int]) -> str:
     return _some([views[i].name for i in suspects])
 
 

@@ -10,11 +10,9 @@ from scipy import ndimage
 
 from splitnerf.data.dataset import spread
 from splitnerf_tools.inspection.directions import horizontal_axes
-from splitnerf_tools.inspection.findings import Inspection
-from splitnerf_tools.report.curves import line_chart
-from splitnerf_tools.report.page import write_html
-from splitnerf_tools.report.pictures import photo_uri
-from splitnerf_tools.report.plans import plan
+from splitnerf_tools.inspection.checks import Inspection
+from splitnerf_tools.report.drawings import line_chart, plan
+from splitnerf_tools.report.embedding import photo_uri, write_html
 
 MARGIN = 1.1  # half of a plan's edge in the distance of the farthest camera
 SHOWN = 120  # photos at most of which nothing is suspected
@@ -39,8 +37,8 @@ def write_page(path: Path, found: Inspection) -> None:
     ]
     write_html(
         path, "splitnerf_tools.inspection", "inspect.html.j2",
-        title=found.title, findings=found.findings, plans=_plans(found, kinds), directions=_directions(found, kinds),
-        charts=_charts(found), photos=[_photo(found, index, suspects.get(index, [])) for index in [*first, *others]],
+        title=found.title, findings=found.findings, plans=_plans(found, kinds), charts=_charts(found),
+        photos=[_photo(found, index, suspects.get(index, [])) for index in [*first, *others]],
         left_out=len(found.views) - len(first) - len(others),
     )  # fmt: skip
 
@@ -56,20 +54,6 @@ def _plans(found: Inspection, kinds: list[str]) -> list[Markup]:
     reach = MARGIN * max(np.abs(poses[:, :3, 3]).max(), found.fit.radius)
     dots = ["object"] * len(points)
     return [plan((0, up), poses, points, (kinds, dots), np.zeros(3), reach) for up in (1, 2)]
-
-
-def _directions(found: Inspection, kinds: list[str]) -> Markup:
-    """The cameras' azimuths, to the right, and elevations, upwards, as an SVG of a unit a degree."""
-    parts = [f'<path class="grid" d="M0 {y}H360"/>' for y in range(0, 181, 30)]
-    parts += [f'<path class="grid" d="M{x} 0V180"/>' for x in range(0, 361, 30)]
-    parts += [f'<text x="{x + 182}" y="178">{x}°</text>' for x in range(-180, 180, 90)]
-    parts += [f'<text x="2" y="{88 - y}">{y}°</text>' for y in (-60, 60)]
-    parts += [
-        f'<circle class="{kind}" cx="{a + 180:.1f}" cy="{90 - e:.1f}" r="2"/>'
-        for a, e, kind in zip(found.azimuth, found.elevation, kinds)
-    ]
-    shape = 'viewBox="0 0 360 180" role="img" aria-label="directions of the cameras"'
-    return Markup(f"<svg {shape}>{''.join(parts)}</svg>")
 
 
 def _charts(found: Inspection) -> list[Markup]:

@@ -17,7 +17,7 @@ FIRST_CODE = 0.5 / 255  # what a colour may lack of the brightest and still be c
 
 
 @dataclass
-class View:
+class ReducedView:
     """One photo.
 
     Attributes:
@@ -54,13 +54,25 @@ class View:
         return self.pose[:3, 3]
 
 
-def views_of(split: Dataset) -> list[View]:
+    def shown(self, points: np.ndarray, nearest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The points [m, 3] that lie within the photo and farther away than `nearest`: their numbers [k], the rows and columns
+        of their pixels [k], and their depths [k]."""
+        local = (points - self.place) @ self.pose[:3, :3]
+        depth = np.maximum(-local[:, 2], 1e-6)
+        fx, fy, cx, cy = self.intrinsics
+        x, y = np.floor(cx + fx * local[:, 0] / depth), np.floor(cy - fy * local[:, 1] / depth)
+        height, width = self.mask.shape
+        numbers = np.flatnonzero((-local[:, 2] > nearest) & (x >= 0) & (x < width) & (y >= 0) & (y < height))
+        return numbers, y[numbers].astype(int), x[numbers].astype(int), depth[numbers]
+
+
+def views_of(split: Dataset) -> list[ReducedView]:
     """The photos of a split."""
     factor = max(1, min(split.height, split.width) // SIZE)
     return [_view(split, index, factor) for index in range(len(split))]
 
 
-def _view(split: Dataset, index: int, factor: int) -> View:
+def _view(split: Dataset, index: int, factor: int) -> ReducedView:
     image, path, exposure = split.images[index], split.image_paths[index], float(split.exposures[index])
     sharp = np.ones(image.shape[:2], bool) if split.known is None else split.known[index]
     known = area_average(sharp.astype(np.float32), factor) > 0.5
@@ -70,7 +82,7 @@ def _view(split: Dataset, index: int, factor: int) -> View:
     brightest = float(linear_to_srgb(np.float32([1 / exposure]))[0]) - FIRST_CODE
     clipped = image[..., :3][object_pixels].max(axis=1, initial=0) >= brightest
     edge = known & ~ndimage.binary_erosion(known)
-    return View(
+    return ReducedView(
         name=os.path.relpath(path, split.root),
         path=path,
         held_out=split.split == "test",

@@ -1,10 +1,11 @@
-"""Line charts as inline SVG that take the page's colours."""
+"""Drawings as inline SVG that take the page's colours: line charts, and plans of cameras and points."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
 from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 460, 250
@@ -13,6 +14,9 @@ PALETTE = (
     "#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a", "#8d9298", "#6aa84f", "#d46a9f", "#5c6bc0",
 )  # fmt: skip
 MAX_POINTS = 400
+SIDE = 400  # of a plan, in its own units
+AHEAD = 0.04  # length of the line that shows where a camera looks, in the plan's edge
+SHOWN_POINTS = 4000
 
 Series = Sequence[tuple[float, float]]
 
@@ -30,8 +34,12 @@ def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False, a
     Returns:
         A `<figure>` with an SVG and a legend; empty where no point is left.
     """
-    kept = {name: _thinned([p for p in points if _drawable(p, log)]) for name, points in series.items()}
-    kept = {name: points for name, points in kept.items() if points}
+    data = curve_data(title, series, log=log) or {"x": [], "series": []}
+    lines = {
+        line["name"]: [(x, y) for x, y in zip(data["x"], line["values"]) if y is not None and (y > 0 or not log)]
+        for line in data["series"]
+    }
+    kept = {name: points for name, points in lines.items() if points}
     if not kept:
         return Markup("")
     scale = math.log10 if log else float
@@ -80,7 +88,7 @@ def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -
     """The same lines for the page's script: `x`, and `series` of `name` and `values`, None where a line has no number; None
     where no line has any. Of more than about MAX_POINTS steps there are means of neighbours, the same for all lines, the last
     step as it is. `log` says how the page starts: it may draw zeros and below on a linear axis."""
-    kept = {name: {x: y for x, y in points if _drawable((x, y), False)} for name, points in series.items()}
+    kept = {name: {x: y for x, y in points if math.isfinite(x) and math.isfinite(y)} for name, points in series.items()}
     xs = sorted(set().union(*kept.values()))
     if not xs:
         return None
@@ -93,20 +101,6 @@ def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -
 
 def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
-
-
-def _drawable(point: tuple[float, float], log: bool) -> bool:
-    return all(math.isfinite(value) for value in point) and (point[1] > 0 or not log)
-
-
-def _thinned(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """At most about MAX_POINTS means of neighbours, the last point as it is."""
-    stride = math.ceil(len(points) / MAX_POINTS)
-    if stride <= 1:
-        return points
-    groups = [points[i : i + stride] for i in range(0, len(points), stride)]
-    means = [(_mean([x for x, _ in g]), _mean([y for _, y in g])) for g in groups]
-    return means[:-1] + [points[-1]]
 
 
 def _linear_ticks(low: float, high: float, count: int) -> list[float]:
@@ -123,3 +117,35 @@ def _log_ticks(low: float, high: float) -> list[float]:
     first, last = math.floor(low + 1e-9), math.ceil(high - 1e-9)
     last = max(last, first + 1)
     return [float(e) for e in range(first, last + 1, max(1, math.ceil((last - first) / 6)))]
+
+
+def plan(
+    axes: tuple[int, int],
+    poses: np.ndarray,
+    points: np.ndarray,
+    kinds: tuple[Iterable[str], Iterable[str]],
+    middle: np.ndarray,
+    reach: float,
+) -> Markup:
+    """Cameras and points as an SVG.
+
+    Args:
+        axes: The numbers of the axes that point to the right and up.
+        poses: [n, 4, 4] camera-to-world, OpenGL axes.
+        points: [m, 3]; of more than 4000 some are drawn.
+        kinds: The CSS class of each camera, and that of each point.
+        middle: [3] the point in the middle of the plan.
+        reach: Half of the plan's edge, in the world's units.
+    """
+    place = lambda p: [SIDE / 2 * (1 + s * (p[i] - middle[i]) / reach) for i, s in zip(axes, (1, -1))]  # noqa: E731
+    parts, (camera_kinds, point_kinds) = [], (list(kind) for kind in kinds)
+    for index in np.random.default_rng(0).permutation(len(points))[:SHOWN_POINTS]:
+        x, y = place(points[index])
+        if 0 <= x <= SIDE and 0 <= y <= SIDE:
+            parts.append(f'<circle class="{point_kinds[index]}" cx="{x:.1f}" cy="{y:.1f}" r="0.8"/>')
+    for pose, kind in zip(poses, camera_kinds):
+        tip, ahead = pose[:3, 3], -pose[:3, 2]
+        (x0, y0), (x1, y1) = place(tip), place(tip + 2 * AHEAD * reach * ahead)
+        parts.append(f'<circle class="{kind}" cx="{x0:.1f}" cy="{y0:.1f}" r="3"/>')
+        parts.append(f'<path class="{kind}" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>')
+    return Markup(f'<svg viewBox="0 0 {SIDE} {SIDE}" role="img" aria-label="cameras and points">{"".join(parts)}</svg>')

@@ -19,7 +19,7 @@ REFUSAL, INTERRUPTION = 2, 130  # exit codes of the command line
 
 
 @dataclass(frozen=True)
-class Batch:
+class BatchPlan:
     """The plan of a call.
 
     Attributes:
@@ -41,7 +41,7 @@ class Batch:
     note: Callable[[str], None]
 
 
-def run_batch(ray: ModuleType, batch: Batch, share: Share) -> bool:
+def run_batch(ray: ModuleType, batch: BatchPlan, share: Share) -> bool:
     """Trains the scenes, each as a task of Ray's; a finished run is left alone by `train --resume auto` itself.
 
     Returns:
