@@ -26,7 +26,7 @@ from torch.profiler import ProfilerActivity, profile
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset, spread
 from splitnerf.devices import choose_device
-from splitnerf.outputs import evaluate_scene
+from splitnerf.evaluate.jobs import Protocol, score_fields
 from splitnerf.training.loop import TrainedScene, Training
 from splitnerf.training.metrics import METRICS
 from splitnerf_tools.bench.provenance import header, provenance
@@ -116,7 +116,8 @@ def summary(run: Path, trained: TrainedScene, data: Path, views: int) -> str:
         result["MiB"] = torch.cuda.max_memory_allocated() >> 20, torch.cuda.max_memory_reserved() >> 20
         said.append("{} MiB at most ({} reserved)".format(*result["MiB"]))
     test = load_dataset(data, "test")
-    scores = evaluate_scene(trained.model, trained.grid, test.select(spread(range(len(test)), views)), None, trained.seconds)[0]
+    views = test.select(spread(range(len(test)), views))
+    scores = score_fields(trained.model, trained.grid, views, None, None, {}, Protocol.spp, trained.seconds).scores
     shown = {"novel views {:.2f} dB": scores["novel_view"]["psnr"], "albedo {:.2f} dB": (scores["albedo"] or {}).get("psnr"),
              "light {:.2f} dB": scores["light_psnr"], "normals {:.2f} degrees": scores["normal_mae_deg"]}  # fmt: skip
     said += [text.format(score) for text, score in shown.items() if score is not None]

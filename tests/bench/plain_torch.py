@@ -36,7 +36,7 @@ from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.workflow import load_run, load_splits
+from splitnerf.pipeline import load_run, load_splits
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import reference  # noqa: E402

@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
 
-from splitnerf.training import gpu_step, loop
+from splitnerf.training import gpu_step, state
 
 REFUSED = (
     "_local_scalar_dense",
@@ -171,7 +171,7 @@ def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
     monkeypatch.setattr(PretendGraph, "replay", counted_replay)
     monkeypatch.setattr(gpu_step.GpuStep, "differentiate", counted_differentiate)
     monkeypatch.setattr(gpu_step, "record", counted_record)
-    monkeypatch.setattr(loop, "Step", gpu_step.GpuStep)
+    monkeypatch.setattr(state, "Step", gpu_step.GpuStep)
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())

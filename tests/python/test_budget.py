@@ -6,8 +6,8 @@ import budget
 
 LAYERS = {
     "splitnerf.errors": set(), "splitnerf.data.photos": {"splitnerf.errors"}, "splitnerf.data.lens": {"splitnerf.data.photos"},
-    "splitnerf.workflow": {"splitnerf.data.photos", "splitnerf.errors"},
-    "splitnerf.cli.train": {"splitnerf.workflow", "splitnerf.data.lens"}, "splitnerf.__main__": {"splitnerf.cli.train"},
+    "splitnerf.pipeline": {"splitnerf.data.photos", "splitnerf.errors"},
+    "splitnerf.cli.train": {"splitnerf.pipeline", "splitnerf.data.lens"}, "splitnerf.__main__": {"splitnerf.cli.train"},
 }  # fmt: skip
 
 
@@ -21,7 +21,7 @@ def test_lines_are_counted_once_each(tmp_path):
 
 def test_loose_modules_join_packages_and_arrows_within_one_do_not_count():
     assert {m.split(".", 1)[1]: p for m, p in budget.packages(LAYERS).items()} == {
-        "errors": "base", "data.photos": "data", "data.lens": "data", "workflow": "run", "cli.train": "cli", "__main__": "cli",
+        "errors": "base", "data.photos": "data", "data.lens": "data", "pipeline": "run", "cli.train": "cli", "__main__": "cli",
     }  # fmt: skip
     assert budget.arrows(LAYERS) == {("data", "base"), ("run", "data"), ("run", "base"), ("cli", "run"), ("cli", "data")}
 

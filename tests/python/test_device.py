@@ -27,7 +27,7 @@ from splitnerf.ops import CELL_OCCUPIED
 from splitnerf.render import model, occupancy, renderer
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
-from splitnerf.workflow import reconstruct
+from splitnerf.pipeline import reconstruct
 
 
 def test_two_devices_in_one_call_are_told(monkeypatch):

@@ -26,7 +26,7 @@ from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.obj import write_obj
 from splitnerf.export.usdz import write_usdz
 from splitnerf.fields import Light
-from splitnerf.outputs import write_assets
+from splitnerf.export.scene import write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.seen import Cameras
 from splitnerf.training.checkpoint import save_checkpoint

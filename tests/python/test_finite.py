@@ -15,6 +15,7 @@ import torch
 from tiny_runs import lines_of, tiny, train
 
 from splitnerf.training import loop as trainer
+from splitnerf.training import state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.data.dataset import load_dataset
@@ -54,7 +55,7 @@ def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, 
 @pytest.fixture(params=[Step, GpuStep])
 def kind(request, monkeypatch) -> type[Step]:
     """Runs take steps of this kind; those of a GPU are read late."""
-    monkeypatch.setattr(trainer, "Step", request.param)
+    monkeypatch.setattr(state, "Step", request.param)
     return request.param
 
 
@@ -62,12 +63,12 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
-    resumed = trainer.dataset_fingerprint
+    resumed = state.dataset_fingerprint
     images = np.array(dataset.images)
     images[2, 12, 12, 0] = np.nan
     dataset = replace(dataset, images=images)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
+        patch.setattr(state, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
         with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
             trainer.train(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
     goes_on(data, run, before)
@@ -152,7 +153,7 @@ def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monk
     written, waiting, fetch = [], [], GpuStep.fetch
     monkeypatch.setattr(GpuStep, "fetch", lambda step, *rest: waiting.append(len(step._pending)) or fetch(step, *rest))
     for i, (kind, every) in enumerate([(Step, 1), (GpuStep, 1), (GpuStep, 16)]):
-        monkeypatch.setattr(trainer, "Step", kind)
+        monkeypatch.setattr(state, "Step", kind)
         monkeypatch.setattr(gpu_step, "READ_EVERY", every)
         (tmp_path / str(i)).mkdir()
         trainer.train(load_dataset(data), tiny(steps=41, **{"sampling.min_weight": 0.0}), tmp_path / str(i))

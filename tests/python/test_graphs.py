@@ -18,6 +18,7 @@ from tiny_runs import lines_of, tiny
 from splitnerf.ops import AdamW
 from splitnerf.training import gpu_step
 from splitnerf.training import loop as trainer
+from splitnerf.training import state
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.config import Config
@@ -133,7 +134,7 @@ def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(da
         shape = shape_of_ball(16)
         return type(shape)(shape.distance.to(hull.device), shape.trust.to(hull.device), shape.box)
 
-    monkeypatch.setattr(trainer, "start_shape", ball)  # the tiny photos are too few
+    monkeypatch.setattr(state, "start_shape", ball)  # the tiny photos are too few
     runs = []
     for name in ("recorded", "called"):
         runs.append(schedule_of_a_gpu(data, tmp_path / name, monkeypatch, recording, **{"surface.start": "stereo"})[0])

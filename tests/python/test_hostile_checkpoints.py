@@ -17,7 +17,7 @@ from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.workflow import load_run
+from splitnerf.pipeline import load_run
 
 
 def repack(path: Path, change=lambda pickled: pickled, **options) -> None:

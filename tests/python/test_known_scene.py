@@ -19,7 +19,7 @@ import trimesh
 from blender_data import look_at
 from PIL import Image
 from splitnerf.data.dataset import load_dataset
-from splitnerf.outputs import write_assets
+from splitnerf.export.scene import write_assets
 from splitnerf.render.seen import Cameras
 from splitnerf.training.loop import train
 from tiny_runs import tiny

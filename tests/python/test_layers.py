@@ -11,12 +11,12 @@ import pytest
 CORE = [
     {"train", "__main__"},
     {"cli"},
-    {"workflow"},
-    {"delivery"},
+    {"pipeline"},
+    {"run_folder"},
     {"training"},
-    {"outputs"},
     {"evaluate", "refinement", "relight"},
-    {"export", "render"},
+    {"export"},
+    {"render"},
     {"fields", "config"},
     {"data"},
     {"ops", "devices", "files"},
@@ -96,5 +96,5 @@ def test_a_planted_import_is_found(imports):
 
 
 def test_a_planted_import_of_a_tool_is_found(imports):
-    planted = {**imports, "splitnerf.workflow": imports["splitnerf.workflow"] | {"splitnerf_tools.view.training_page"}}
-    assert wrong_way(planted) == ["splitnerf.workflow imports splitnerf_tools.view.training_page"]
+    planted = {**imports, "splitnerf.pipeline": imports["splitnerf.pipeline"] | {"splitnerf_tools.view.training_page"}}
+    assert wrong_way(planted) == ["splitnerf.pipeline imports splitnerf_tools.view.training_page"]

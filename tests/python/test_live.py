@@ -22,10 +22,10 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.export.surface import surface_materials
-from splitnerf.outputs import surface_of
+from splitnerf.export.scene import surface_of
 from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
-from splitnerf.training.observer import Wish
+from splitnerf.training.observer import NOBODY, Event, Request
 from splitnerf_tools.view import live as live_module
 from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.events import EventStream
@@ -53,11 +53,11 @@ class Stepped:
         run.mkdir(exist_ok=True)
         self.live = Live("mine")
         self.server = ViewServer(self.live.shown, live=self.live)
-        self.training = Training(load_dataset(data), tiny(steps=1000), run, CPU, [self.live])
-        self.live.began(self.training)
+        self.training = Training(load_dataset(data), tiny(steps=1000), run, CPU, self.live)
+        self.live(Event("begun", self.training))
 
     def between(self):
-        return self.live.between_steps(self.training)
+        return self.live(Event("step", self.training))
 
     def button(self, name):
         return ask(self.server, f"control/{name}", method="POST", body=b"")
@@ -152,7 +152,7 @@ def test_an_open_page_gets_surface_light_and_numbers(stepped):
 def test_curves_hold_the_lines_of_the_log(data, tmp_path):
     live = Live("mine")
     (tmp_path / "mine").mkdir()
-    Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU, [live]).complete()
+    Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU, live).complete()
     written = [json.loads(line) for line in (tmp_path / "mine/metrics.jsonl").read_text().splitlines()]
     lines = live.lines(0)
     assert [line["step"] for line in lines] == [line["step"] for line in written]
@@ -160,23 +160,23 @@ def test_curves_hold_the_lines_of_the_log(data, tmp_path):
     assert {name for name in written[0] if name.startswith("loss")} <= lines[0].keys()
     assert live.lines(20) == lines[20:]
     resumed = Live("mine")
-    resumed.began(Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU))
+    resumed(Event("begun", Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU)))
     assert resumed.lines(0) == lines
 
 
 def test_buttons_steer_the_run(stepped, capsys):
     assert stepped.button("pause")[0] == 200
-    assert [stepped.between(), stepped.between()] == [Wish.PAUSE] * 2 and stepped.live.events.state["paused"]
+    assert [stepped.between(), stepped.between()] == [Request.PAUSE] * 2 and stepped.live.events.state["paused"]
     stepped.button("checkpoint")
-    assert [stepped.between(), stepped.between()] == [Wish.SAVE, Wish.PAUSE]
+    assert [stepped.between(), stepped.between()] == [Request.SAVE, Request.PAUSE]
     assert stepped.live.events.state["saved"] == stepped.training.step
     stepped.button("resume")
     assert stepped.between() is None and not stepped.live.events.state["paused"]
     stepped.button("pause")
     stepped.button("stop")
-    assert stepped.between() is Wish.STOP
+    assert stepped.between() is Request.STOP
     assert "pauses until its page resumes it" in capsys.readouterr().err
-    stepped.live.delivering("export")
+    stepped.live(Event("export"))
     assert stepped.between() is None
     assert error_of(stepped.button("pause")) == (422, "the run does not train now")
     assert error_of(stepped.button("reboot")) == (422, "there is no such button")
@@ -197,14 +197,14 @@ def test_the_delivered_asset_is_shown(stepped, tmp_path):
         folder.mkdir()
         content = triangle().write(folder / "mesh.glb").read_bytes()
         write_image(folder / "environment.exr", np.full((4, 8, 3), version, np.float32))
-        stepped.live.delivering(stage, folder)
+        stepped.live(Event(stage, path=folder))
         assert stepped.live.events.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
         (source,) = json.loads(ask(stepped.server, "scene.json")[2])["sources"]
         assert source == {"name": "mine", "light": 1, "version": version}
         assert ask(stepped.server, "assets/0")[2] == content
         assert (halves(ask(stepped.server, "lights/1"))[..., :3] == version).all()
     (tmp_path / "final/mesh.glb").write_text("hello")
-    stepped.live.delivering("evaluation", tmp_path / "final")
+    stepped.live(Event("evaluation", path=tmp_path / "final"))
     scene = json.loads(ask(stepped.server, "scene.json")[2])
     assert scene["sources"][0]["version"] == 2 and "mesh.glb: is neither" in scene["problems"][0]
     assert stepped.live.events.state["version"] == 2  # pages wait for no other one
@@ -216,19 +216,20 @@ def test_a_page_changes_no_bit_of_a_deterministic_run(data, tmp_path, eager):
     class Curious(Live):
         buttons = ["checkpoint"]
 
-        def between_steps(self, training):
-            self.taken(self.shown.sources[0])
-            if training.step == 8 and self.buttons:
-                self.ask(self.buttons.pop())
-            return super().between_steps(training)
+        def __call__(self, event):
+            if event.kind == "step":
+                self.taken(self.shown.sources[0])
+                if event.training.step == 8 and self.buttons:
+                    self.ask(self.buttons.pop())
+            return super().__call__(event)
 
     live = Curious("mine")
     live.events.listeners = 1
     config = tiny(steps=24, deterministic=True, mesh_every=0.2)
     states = []
-    for name, observers in (("watched", [live]), ("alone", [])):
+    for name, observer in (("watched", live), ("alone", NOBODY)):
         (tmp_path / name).mkdir()
-        Training(load_dataset(data), config, tmp_path / name, CPU, observers).complete()
+        Training(load_dataset(data), config, tmp_path / name, CPU, observer).complete()
         states.append(torch.load(tmp_path / name / "checkpoint.pt", weights_only=True))
     assert live.shown.sources[0].version >= 5 and live.events.state["saved"] == 8
     for key in ("model", "optimiser", "generator", "torch_generator", "occupancy", "mesh_vertices"):
@@ -276,7 +277,7 @@ def test_a_failure_is_told(capsys):
         raise RuntimeError
     assert live.events.state["ended"].startswith("the command ended before the run was done")
     with training_page("mine", 0) as live:
-        live.delivering("evaluation")
+        live(Event("evaluation"))
     assert live.events.state["ended"].startswith("the run is done")
     with training_page("mine", 0) as live:
         pass
@@ -287,19 +288,20 @@ def test_a_failure_is_told(capsys):
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 def test_what_is_not_finite_is_null(value, stepped):
     """JSON has no word for it, and a page that cannot read a line never gets past it."""
-    stepped.live.logged({"step": 3, "psnr": 20.123456, "loss": value, "loss_colour": value})
+    line = {"step": 3, "psnr": 20.123456, "loss": value, "loss_colour": value}
+    stepped.live(Event("logged", stepped.training, line))
     content = ask(stepped.server, "curves/0")[2]
     (line,) = json.loads(content, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
     assert line == {"step": 3, "psnr": 20.123, "loss": None, "loss_colour": None}
-    stepped.training.psnr_mean = value
-    stepped.live.began(stepped.training)
+    stepped.training.log.psnr = value
+    stepped.live(Event("begun", stepped.training))
     assert stepped.live.events.state["psnr"] is None
 
 
 @pytest.mark.parametrize("error", [OSError(5, "Input/output error"), MemoryError()])
 def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path, monkeypatch):
     triangle().write(tmp_path / "mesh.glb")
-    stepped.live.delivering("evaluation", tmp_path)
+    stepped.live(Event("evaluation", path=tmp_path))
 
     def read(*_):
         raise error

@@ -16,59 +16,58 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.progress import Interrupt
 from splitnerf.refinement.job import STATE
-from splitnerf.training import observer as observer_module
+from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
-from splitnerf.training.observer import Observer, Observers, Wish, heed
+from splitnerf.training.observer import NOBODY, Observer, Request, together
 from splitnerf.training.schedule import light_period
-from splitnerf.workflow import load_run, reconstruct
+from splitnerf.pipeline import load_run, reconstruct
 
 CPU = torch.device("cpu")
 
 
-class Asking(Observer):
-    """Wishes one thing after the other, from a step on; and writes down what it hears."""
+class Asking:
+    """Requests one thing after the other, from a step on; and writes down what it learns."""
 
-    def __init__(self, at: int = 0, *wishes: Wish | None):
-        self.at, self.wishes, self.heard = at, list(wishes), []
+    def __init__(self, at: int = 0, *requests: Request | None):
+        self.at, self.requests, self.heard, self.logged = at, list(requests), [], lambda line: None
 
-    def began(self, training):
-        self.heard.append(("began", training.step))
-
-    def logged(self, line):
-        self.heard.append(("logged", line["step"]))
-
-    def previewed(self, picture, step):
-        self.heard.append(("previewed", step, picture.is_file()))
-
-    def between_steps(self, training):
-        self.heard.append(("between", training.step))
-        return self.wishes.pop(0) if training.step >= self.at and self.wishes else None
-
-    def delivering(self, stage, folder=None):
-        self.heard.append((stage, None if folder is None else (folder / "mesh.glb").is_file()))
+    def __call__(self, event):
+        kind, training, path = event.kind, event.training, event.path
+        if kind == "logged":
+            self.heard.append((kind, event.line["step"]))
+            self.logged(event.line)
+        elif kind == "previewed":
+            self.heard.append((kind, training.step, path.is_file()))
+        elif training is not None:
+            self.heard.append((kind, training.step))
+            if kind == "step":
+                return self.requests.pop(0) if training.step >= self.at and self.requests else None
+        else:
+            self.heard.append((kind, None if path is None else (path / "mesh.glb").is_file()))
 
 
-def trained(data, run, config: Config, *observers: Observer):
+def trained(data, run, config: Config, observer: Observer = NOBODY):
     run.mkdir(exist_ok=True)
-    return Training(load_dataset(data), config, run, CPU, observers).complete()
+    return Training(load_dataset(data), config, run, CPU, observer).complete()
 
 
-def test_observers_hear_of_all_that_happens(data, tmp_path):
-    asking = Asking()
+def test_observers_learn_of_all_that_happens(data, tmp_path):
+    asking, second = Asking(), Asking()
     config = tiny(steps=40, preview_every=0.5)
     period = light_period(config)  # steps that share gradients of the light, and are not parted
-    reconstruct(data, tmp_path / "run", config, observers=[asking])
+    reconstruct(data, tmp_path / "run", config, observer=together([asking, second]))
     heard = asking.heard
-    assert heard[0] == ("began", 0) and [event for event in heard if event[0] == "between"] == [
-        ("between", n) for n in range(period, 41, period)
+    assert heard[0] == ("begun", 0) and [event for event in heard if event[0] == "step"] == [
+        ("step", n) for n in range(period, 41, period)
     ]
     assert [event[1] for event in heard if event[0] == "logged"] == [line["step"] for line in lines_of(tmp_path / "run")]
     assert [event for event in heard if event[0] == "previewed"] == [("previewed", 20, True), ("previewed", 40, True)]
     assert heard[-2:] == [("export", None), ("evaluation", True)]
+    assert second.heard == heard
     resumed = Asking()
-    reconstruct(data, tmp_path / "run", config.replace({"steps": 41}), resume=True, observers=[resumed])
-    assert resumed.heard[0] == ("began", 40)
+    reconstruct(data, tmp_path / "run", config.replace({"steps": 41}), resume=True, observer=resumed)
+    assert resumed.heard[0] == ("begun", 40)
 
 
 def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch):
@@ -76,38 +75,37 @@ def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch
         assert (source / "mesh.glb").is_file()
         raise InputError("nothing to fit")
 
-    monkeypatch.setattr("splitnerf.delivery.refine_folder", refused)
+    monkeypatch.setattr("splitnerf.pipeline.refine_folder", refused)
     asking = Asking()
-    reconstruct(data, tmp_path / "run", tiny(steps=30, **{"refinement.enabled": True}), observers=[asking])
+    reconstruct(data, tmp_path / "run", tiny(steps=30, **{"refinement.enabled": True}), observer=asking)
     assert asking.heard[-3:] == [("export", None), ("refinement", True), ("evaluation", True)]
 
 
 def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):
     config = tiny(steps=400)
-    scene, scores = reconstruct(data, tmp_path / "run", config, observers=[Asking(20, Wish.STOP)])
+    scene, scores = reconstruct(data, tmp_path / "run", config, observer=Asking(20, Request.STOP))
     assert scene.finished and 20 <= scene.step < 30 and scores["scored"] == "fields"
     assert {"mesh.glb", "environment.exr", "report.html"} <= {path.name for path in (tmp_path / "run").iterdir()}
     assert main(["train", str(data), "--out", str(tmp_path / "run"), "--resume", "auto"]) == DONE  # is finished
-    asking = Asking(60, Wish.STOP)
-    again, _ = reconstruct(data, tmp_path / "run", config, resume=True, observers=[asking])
-    assert asking.heard[0] == ("began", scene.step) and 60 <= again.step < 70
+    asking = Asking(60, Request.STOP)
+    again, _ = reconstruct(data, tmp_path / "run", config, resume=True, observer=asking)
+    assert asking.heard[0] == ("begun", scene.step) and 60 <= again.step < 70
 
 
-@pytest.mark.parametrize("ends", [Wish.STOP, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("ends", [Request.STOP, signal.SIGINT, signal.SIGTERM])
 def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
     """Also between two of the steps that are logged by their number; and once, where the run goes on from there."""
 
-    class Ending(Observer):
-        def between_steps(self, training):
-            if training.step < 24:
-                return None
-            if ends is Wish.STOP:
-                return ends
-            os.kill(os.getpid(), ends)
+    def ending(event):
+        if event.kind != "step" or event.training.step < 24:
             return None
+        if ends is Request.STOP:
+            return ends
+        os.kill(os.getpid(), ends)
+        return None
 
     config = tiny(steps=40)
-    scene = trained(data, tmp_path, config, Ending())
+    scene = trained(data, tmp_path, config, ending)
     assert scene.step == 24 and [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24]
     training = Training(load_dataset(data), config, tmp_path, CPU)
     training.restore()
@@ -119,7 +117,7 @@ def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
 def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
     """Levels that were never trained hold noise."""
     config = tiny(steps=400, start_levels=2, levels_open_by=1.0)
-    scene, _ = reconstruct(data, tmp_path / "run", config, observers=[Asking(20, Wish.STOP)])
+    scene, _ = reconstruct(data, tmp_path / "run", config, observer=Asking(20, Request.STOP))
     assert load_run(tmp_path / "run")[0].sdf_field.grid.n_active == scene.model.sdf_field.grid.n_active == 2
 
 
@@ -127,7 +125,7 @@ def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
 def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
     """With its refinement, if that was interrupted; else with the training."""
     config = tiny(steps=40)
-    stopped = trained(data, tmp_path, config, Asking(20, Wish.STOP))
+    stopped = trained(data, tmp_path, config, Asking(20, Request.STOP))
     assert stopped.finished and stopped.step == 20
     if stage_begun:
         (tmp_path / STATE).write_bytes(b"")
@@ -138,44 +136,43 @@ def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
 
 
 def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
-    asking = Asking(8, Wish.SAVE, None, Wish.STOP)
+    asking = Asking(8, Request.SAVE, None, Request.STOP)
     steps = []
-    asking.logged = lambda line: steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.wishes) == 1 else None
+    asking.logged = lambda line: steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.requests) == 1 else None
     trained(data, tmp_path, tiny(steps=400), asking)
     assert set(steps) == {8}
 
 
 def test_a_pause_is_no_time_of_training(data, tmp_path):
-    asking = Asking(8, *[Wish.PAUSE] * 3)
-    training = Training(load_dataset(data), tiny(steps=16), tmp_path, CPU, [asking])
+    asking = Asking(8, *[Request.PAUSE] * 3)
+    training = Training(load_dataset(data), tiny(steps=16), tmp_path, CPU, asking)
     started = training.started
-    assert training.complete().step == 16 and not asking.wishes
-    assert training.started - started >= 0.99 * 3 * observer_module.PAUSE
+    assert training.complete().step == 16 and not asking.requests
+    assert training.started - started >= 0.99 * 3 * loop.PAUSE
 
 
 def test_the_time_of_a_pause_is_told(monkeypatch):
     clock = [0.0]
     fake = SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: clock.__setitem__(0, clock[0] + seconds))
-    monkeypatch.setattr(observer_module, "time", fake)
+    monkeypatch.setattr(loop, "time", fake)
     done = []
     training = SimpleNamespace(
-        observers=Observers([Asking(0, Wish.PAUSE, Wish.PAUSE, Wish.SAVE, Wish.PAUSE)]), stopped=False, step=1,
+        observer=Asking(0, Request.PAUSE, Request.PAUSE, Request.SAVE, Request.PAUSE), stopped=False, step=1,
         settle=lambda: done.append("settle"), save=lambda: done.append("save"),
     )  # fmt: skip
     with Interrupt() as interrupt:
-        assert heed(training, interrupt) == pytest.approx(3 * observer_module.PAUSE)
+        assert Training.fulfil_requests(training, interrupt) == pytest.approx(3 * loop.PAUSE)
     assert done == ["settle", "settle", "settle", "save", "settle"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_paused_run(data, tmp_path, number):
-    class Pausing(Observer):
-        def between_steps(self, training):
-            if training.step < 8:
-                return None
-            os.kill(os.getpid(), number)
-            return Wish.PAUSE
+    def pausing(event):
+        if event.kind != "step" or event.training.step < 8:
+            return None
+        os.kill(os.getpid(), number)
+        return Request.PAUSE
 
-    scene = trained(data, tmp_path, tiny(steps=400), Pausing())
+    scene = trained(data, tmp_path, tiny(steps=400), pausing)
     assert not scene.finished and scene.step < 20
     assert load_checkpoint(tmp_path / "checkpoint.pt")["step"] == scene.step

@@ -12,7 +12,7 @@ from tiny_runs import train
 from splitnerf import plugins
 from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser
 from splitnerf.plugins import Plugin, installed
-from splitnerf.workflow import is_finished
+from splitnerf.run_folder import is_finished
 from splitnerf_tools.plugin import PLUGIN
 
 

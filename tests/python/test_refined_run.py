@@ -17,7 +17,7 @@ import torch
 from painted_ball import sky, with_textures
 from tiny_runs import train
 
-from splitnerf import delivery, progress
+from splitnerf import pipeline, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.summary import print_refinement
 from splitnerf.data.gltf import read_asset
@@ -110,7 +110,7 @@ def test_photos_that_cannot_be_fitted_leave_the_trained_asset(data, tmp_path, ca
     def refuses(*args, **kwargs):
         raise InputError("no pixel of the photos shows the asset")
 
-    monkeypatch.setattr(delivery, "refine_folder", refuses)
+    monkeypatch.setattr(pipeline, "refine_folder", refuses)
     run = tmp_path / "run"
     assert train(data, run, "--steps", "12", *REFINED) == DONE
     assert "without refinement, as no pixel" in capsys.readouterr().err
@@ -165,7 +165,7 @@ def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_anot
 
 
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
-@pytest.mark.parametrize("place", ["refinement.job.write_environment", "delivery.score_run", "delivery.forget_state"])
+@pytest.mark.parametrize("place", ["refinement.job.write_environment", "pipeline.score_run", "pipeline.forget_state"])
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
     run, data, tmp_path, monkeypatch, place, minutes
 ):
@@ -394,7 +394,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     printed = capsys.readouterr().err
     assert printed.startswith("  0% 00:00<? refinement, outline, round 1 of 3\n")
     assert re.search(r"100% .* refinement, step 4, photos [1-4]\d\.\d\d dB", printed)
-    summary = delivery.refinement_summary(folder)
+    summary = pipeline.refinement_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
     print_refinement(summary)

@@ -15,13 +15,15 @@ from tiny_runs import lines_of, tiny
 
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.fields import VisibilityBits
+from splitnerf.fields import EvaluatedLight, VisibilityBits
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged
 from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.metrics import StepLog
 from splitnerf.training.step import Capacity, StepNumbers
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
@@ -59,7 +61,7 @@ def refreshed(data, tmp_path, monkeypatch):
         at = steps_of(monkeypatch)
         seen = {
             "grid": calls(monkeypatch, OccupancyGrid, "update", lambda _, *args, **settings: (at[0], settings)),
-            "backward": calls(monkeypatch, loop.EvaluatedLight, "backward", lambda *_: at[0]),
+            "backward": calls(monkeypatch, EvaluatedLight, "backward", lambda *_: at[0]),
         }  # fmt: skip
         config = tiny(steps=20, **PLAIN, **settings)
         return loop.train(load_dataset(data), config, tmp_path), seen
@@ -162,11 +164,11 @@ def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
     assert rays[1:] == [next_ray_count(a, round(n), config) for a, n in zip(rays, samples[:-1])]
 
 
-def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(data, tmp_path):
+def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(tmp_path):
     """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; and the steps that were skipped."""
-    training = loop.Training(load_dataset(data), tiny(), tmp_path, torch.device("cpu"))
-    training.take_step.skipped = 5
-    line = training.line(StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600))
+    log = StepLog(tmp_path)
+    log.take(StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600), 3.0, 0.5, skipped=5)
+    line = log.pending
     counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}
     expected = counts | {"loss": 0.5, "loss_colour": 0.5}
     assert {name: line[name] for name in expected} == expected
@@ -187,10 +189,10 @@ def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, mo
     before = {name: value.clone() for name, value in training.model.state_dict().items()}
     training.refresh()
     training.advance(SimpleNamespace(show=lambda *_: None))
-    assert training.psnr_mean is None and len(step._pending) == 1
+    assert training.log.psnr is None and len(step._pending) == 1
     training.settle()
     moved = [name for name, value in training.model.state_dict().items() if not torch.equal(value, before[name])]
-    assert training.step == 1 and bool(moved) == complete and (training.psnr_mean is not None) == complete
+    assert training.step == 1 and bool(moved) == complete and (training.log.psnr is not None) == complete
     assert any(leaf.grad.any() for leaf in training.light.leaves if leaf.grad is not None) == complete
     assert {int(moments["step"]) for moments in training.optimiser.state.values()} == {int(complete)}
 
@@ -237,11 +239,11 @@ def test_training_leaves_the_refinement_its_share_of_the_minutes(data, tmp_path,
     assert training.progress == pytest.approx(0.5 / share)
 
 
-def test_the_bar_tells_the_step_the_error_and_the_samples(data, tmp_path):
-    training = loop.Training(load_dataset(data), tiny(steps=100), tmp_path, torch.device("cpu"))
-    assert training.told(0, 3.04) == "step 0 3.0 samples/ray"
-    training.psnr_mean = 21.456
-    assert training.told(4, 3.24) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
+def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
+    log, numbers = StepLog(tmp_path), StepNumbers(4, 50, {}, {}, 1.0, Capacity(300, 120, 40), 20.0, 162)
+    assert log.text(numbers) == "step 4 3.2 samples/ray"
+    log.psnr = 21.456
+    assert log.text(numbers) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
 
 
 def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):
@@ -269,12 +271,12 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     other_light = {name: torch.rand_like(cached[name]) for name in ("sky", "sent") if cached[name] is not None}
     one.model.occlusion.restore_light(cached | other_light)
     one.save()
-    kept = loop.load_checkpoint(tmp_path / "checkpoint.pt")
+    kept = load_checkpoint(tmp_path / "checkpoint.pt")
     torch.manual_seed(9)
     other.restore()
     assert not other.first
     other.save()
-    again, before = flat(loop.load_checkpoint(tmp_path / "checkpoint.pt")), flat(kept)
+    again, before = flat(load_checkpoint(tmp_path / "checkpoint.pt")), flat(kept)
     assert again.keys() == before.keys()
     different = [key for key in before if not same(again[key], before[key])]
     assert [key for key in different if not key.startswith("optimiser.param_groups")] == ["config.run.seed"]
@@ -290,7 +292,7 @@ def test_a_run_that_is_interrupted_ends_when_the_light_has_moved(data, tmp_path,
     config = tiny(steps=20, light_step_every=4, grid_every=3, mesh_every=0.3, preview_every=2.0)
     trained = loop.train(load_dataset(data), config, tmp_path)
     assert trained.step == 8 and not trained.finished and cells == [0, 3, 6] and requests == [0.3]
-    assert loop.load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 8
+    assert load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 8
 
 
 @pytest.mark.parametrize("deterministic", [False, True])

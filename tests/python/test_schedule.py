@@ -17,6 +17,7 @@ from splitnerf.training import loop as trainer
 from splitnerf.training import losses
 from splitnerf.training import schedule as optimiser_module
 from splitnerf.training import step as step_module
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import make_optimiser, set_learning_rate
 from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
 
@@ -234,9 +235,9 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
         monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
     )
     terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, losses)
-    requested, request = [], trainer.SurfaceMesh.request
+    requested, request = [], SurfaceMesh.request
     monkeypatch.setattr(
-        trainer.SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)
+        SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)
     )
     trainer.train(load_dataset(data), config, tmp_path)
 

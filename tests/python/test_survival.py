@@ -26,7 +26,7 @@ from splitnerf.cli.streams import lasting_streams
 from splitnerf.data.dataset import load_dataset
 from splitnerf.files import LOCK
 from splitnerf.progress import Interrupt, ended_by_signals
-from splitnerf.training import loop
+from splitnerf.training import loop, state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
 
@@ -94,7 +94,7 @@ def test_work_that_may_be_left_out_is_so_after_a_request():
 
 def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys, number=signal.SIGTERM):
     """As Ctrl-C does: here while the meshes are exported."""
-    monkeypatch.setattr("splitnerf.delivery.write_assets", lambda *_, **__: signal.raise_signal(number))
+    monkeypatch.setattr("splitnerf.pipeline.write_assets", lambda *_, **__: signal.raise_signal(number))
     assert train(data, tmp_path / "run", "--steps", "8") == INTERRUPTED
     assert "interrupted" in capsys.readouterr().err and not (tmp_path / "run" / LOCK).exists()
     monkeypatch.undo()
@@ -262,7 +262,7 @@ def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, tmp_path, monkey
     def fails(*_) -> None:
         raise MemoryError("32 TiB")
 
-    monkeypatch.setattr(loop, "SceneModel", fails)
+    monkeypatch.setattr(state, "SceneModel", fails)
     assert train(data, run, "--overwrite") == FAILED
     assert (run / "checkpoint.pt").read_bytes() == before and (run / "mesh.glb").is_file()
 
@@ -432,7 +432,7 @@ def run_command(*words: str) -> None:
 def started(*words: str) -> BaseProcess:
     """A program that runs a command, forked from one that has loaded the packages already."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["splitnerf.workflow", "torch._dynamo"])
+    context.set_forkserver_preload(["splitnerf.pipeline", "torch._dynamo"])
     process = context.Process(target=run_command, args=words)
     process.start()
     return process

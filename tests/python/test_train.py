@@ -54,7 +54,7 @@ def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
     from splitnerf.data.dataset import load_dataset
     from splitnerf.render.renderer import render_maps
     from splitnerf.training.loop import train as train_scene
-    from splitnerf.workflow import load_run
+    from splitnerf.pipeline import load_run
 
     config = preset("cpu").replace(SMALL | {
         "steps": 24, "occlusion.kind": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,

@@ -25,7 +25,7 @@ from splitnerf.data.images import write_image
 from splitnerf.export.glb import write_glb
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
-from splitnerf.training.observer import Observer
+from splitnerf.training.observer import Event, together
 from splitnerf_tools.view import live as live_module
 from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.live import Live
@@ -43,10 +43,9 @@ def press(selector):
     return {"do": "press", "selector": selector} | RESTLESS
 
 
-class Slowly(Observer):
+def slowly(event):
     """Leaves the machine to the browser."""
-
-    def between_steps(self, training):
+    if event.kind == "step":
         time.sleep(0.1)
 
 
@@ -62,15 +61,15 @@ def walk(data, tmp_path_factory):
         patch.setattr("splitnerf_tools.view.live.training_asset", functools.partial(training_asset, resolution=24))
         patch.setattr(live_module, "ASSET_EVERY", 1.0)
         server = stack.enter_context(serving(ViewServer(live.shown, live=live)))
-        training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), [live, Slowly()])
+        training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), together([live, slowly]))
         done = []
 
         def deliver():
             done.append(training.complete())
-            live.delivering("export")
+            live(Event("export"))
             triangle().write(run / "mesh.glb")
             write_image(run / "environment.exr", np.ones((4, 8, 3), np.float32))
-            live.delivering("evaluation", run)
+            live(Event("evaluation", path=run))
 
         thread = threading.Thread(target=deliver)
         patch.setattr("splitnerf.progress.ending_signals", list)  # this thread has none
@@ -202,7 +201,7 @@ def test_a_glb_of_200_megabytes_loads(tmp_path):
 def test_an_asset_without_a_light_is_shown(tmp_path):
     triangle().write(tmp_path / "mesh.glb")
     live = Live("mine")
-    live.delivering("export", tmp_path)
+    live(Event("export", path=tmp_path))
     with serving(ViewServer(live.shown, live=live)) as server:
         told = look_at(server.url, [
             {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),

@@ -152,7 +152,7 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
     """Scores one run or file, writes the requested files, and returns the scores."""
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
-    from splitnerf.workflow import evaluate_run
+    from splitnerf.pipeline import evaluate_run
 
     protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
     if is_asset(target):

@@ -38,9 +38,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import FIELDS
-    from splitnerf.delivery import export_folder
-    from splitnerf.outputs import FORMATS
-    from splitnerf.workflow import export_run
+    from splitnerf.run_folder import export_folder
+    from splitnerf.export.scene import FORMATS
+    from splitnerf.pipeline import export_run
 
     formats = [name.strip() for name in args.formats.split(",")]
     unknown = [name for name in formats if name not in FORMATS]

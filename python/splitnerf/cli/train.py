@@ -150,19 +150,19 @@ def train_in(
     """Trains in a locked folder, calls the observers, prints the outcome and returns the exit code."""
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.jobs import read_evaluation
-    from splitnerf.workflow import reconstruct
+    from splitnerf.pipeline import reconstruct
+    from splitnerf.training.observer import Event, together
 
     plan = planned(run, args, settings)
     if plan.is_finished:
-        for observer in observers:
-            observer.delivering("evaluation", run)
+        together(observers)(Event("evaluation", path=run))
         print(f"{run}: is finished")
         print_scores(read_evaluation(run))
         return DONE
     device = choose_device(plan.device)
     trained, evaluation = reconstruct(
         args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite,
-        observers=observers,
+        observer=together(observers),
     )  # fmt: skip
     if evaluation is None:
         where = "in the refinement" if trained.finished else f"at step {trained.step}"
@@ -194,7 +194,7 @@ def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) ->
     from splitnerf.config import preset
     from splitnerf.devices import choose_device
     from splitnerf.training.checkpoint import config_of, load_checkpoint
-    from splitnerf.workflow import begin_or_resume, is_finished
+    from splitnerf.run_folder import begin_or_resume, is_finished
 
     resume, overwrite = begin_or_resume(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
     begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None

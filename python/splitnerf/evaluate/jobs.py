@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,11 @@ from splitnerf.evaluate.lpips import load_distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
 from splitnerf.evaluate.table import COLUMNS, GROUPS, SCORES
+from splitnerf.progress import tracked
+from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
+from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import MOST_SPP, AssetRenderer
+from splitnerf.render.renderer import render_maps
 
 
 @dataclass(frozen=True)
@@ -137,18 +141,46 @@ def score_asset(
         seconds: The time that the asset took, to record.
         free_exposure: Whether each photo has an exposure of its own, which is fitted.
     """
-    truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
-    if free_exposure and environment is not None:
+    relit = relit_scores(renderer, views, maps, spp)
+    evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure)
+    return replace(evaluated, scores=evaluated.scores | {"scored": "asset", "spp": spp})
+
+
+def score_fields(
+    model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, asset: Asset | None,
+    maps: dict[str, Path], spp: int, seconds: float, free_exposure: bool = False,
+) -> Evaluated:  # fmt: skip
+    """Scores trained fields by rendering them.
+
+    Args:
+        model, grid: The trained scene.
+        views: The views.
+        mesh: The surface, in the data's world frame; None for that of the asset.
+        asset: What was exported, which the relit views show; None where there is none.
+        maps, spp, seconds, free_exposure: See :func:`score_asset`; `spp` is of the relit views.
+    """
+    predictions = [render_maps(model, grid, views, i) for i in tracked(range(len(views)), "evaluation, view")]
+    light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
+    relit = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
+    mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
+    evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure)
+    return replace(evaluated, scores=evaluated.scores | {"scored": "fields"})
+
+
+def _scored(
+    predictions: list[dict[str, np.ndarray]], views: Dataset, light: np.ndarray | None, mesh: trimesh.Trimesh | None,
+    relit: tuple[RelitViews | None, dict | None], seconds: float | None, free_exposure: bool,
+) -> Evaluated:  # fmt: skip
+    """Scores rendered views, a light and a mesh against the truth of the data."""
+    if free_exposure and light is not None:
         views = exposed_like(views, predictions)
-    relit, relight_part = relit_scores(renderer, views, maps, spp)
+    truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     scores = evaluate_maps(
-        predictions, views, truths, environment, truth.light, asset_mesh(asset), truth.mesh, seconds,
-        relight=relight_part, distance=load_distance(),
-    )  # fmt: skip
-    scores |= {"exposures": "fitted"} if free_exposure else {}
-    return Evaluated(scores | {"scored": "asset", "spp": spp}, views, predictions, truths, relit)
+        predictions, views, truths, light, truth.light, mesh, truth.mesh, seconds, relight=relit[1], distance=load_distance()
+    )
+    return Evaluated(scores | ({"exposures": "fitted"} if free_exposure else {}), views, predictions, truths, relit[0])
 
 
 def is_asset(path: Path) -> bool:

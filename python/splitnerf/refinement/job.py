@@ -19,7 +19,7 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average
-from splitnerf.data.json_files import write_json
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
@@ -28,7 +28,7 @@ from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.files import locked
 from splitnerf.progress import Interrupt, Progress
-from splitnerf.refinement.fit import Refined, RefinementSettings, Stage
+from splitnerf.refinement.fit import Refined, RefinementSettings, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
@@ -212,6 +212,18 @@ def record_of(refined: Refined, seconds: float) -> dict:
     lamp = None if refined.lamp is None else refined.lamp._asdict()
     return {"seconds": round(seconds, 1), "outline": refined.outline, "lamp": lamp, "saturated": refined.saturated,
             "sweeps": [sweep._asdict() for sweep in refined.sweeps]}  # fmt: skip
+
+
+def refinement_summary(run: Path) -> dict:
+    """The changes by the refinement of a run; pairs are before and after."""
+    record = read_json(run / RECORD, "sweeps")
+    sweeps, outline = record["sweeps"], record["outline"]
+    return {
+        "steps": len(sweeps), "seconds": record["seconds"],
+        "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
+        "outline_error": [outline[0], outline[-1]] if outline else None,
+        "saturated": record["saturated"],
+    }  # fmt: skip
 
 
 def forget_state(folder: Path) -> None:

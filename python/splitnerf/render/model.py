@@ -27,6 +27,7 @@ from splitnerf.fields.occlusion import TracedBits
 from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import HashGridSpec, light_queries, split_sum_shade, summed_correction
 
+ENVIRONMENT_ROWS = 128  # of the image of a trained light
 N_FEATURES = 2  # of a level of the hash grid
 N_OUTPUTS = 13  # of the surface's network, the distance among them
 HEAD_LAYERS = 2  # hidden layers of the networks of material and occlusion

@@ -56,6 +56,15 @@ def load_checkpoint(path: Path) -> dict:
     return content
 
 
+def check_same_scene(content: dict, fingerprint: str, run: Path) -> None:
+    """Raises InputError where a run's checkpoint was trained on other images."""
+    if content["fingerprint"] != fingerprint:
+        raise InputError(
+            f"{run / 'checkpoint.pt'}: was trained on other images, or with another --downscale or --eval-mode; give those, or "
+            "another --out"
+        )
+
+
 def config_of(content: dict) -> Config:
     """The settings of the run that wrote the checkpoint."""
     return Config().replace(content["config"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,48 @@ from splitnerf.files import atomic_path, reason
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.renderer import render_maps
+from splitnerf.training.step import StepNumbers
 
 METRICS = "metrics.jsonl"
+LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
+
+
+class StepLog:
+    """The numbers of a run's steps, as lines of metrics.jsonl and as the bar's text.
+
+    Attributes:
+        psnr: The batches' mean PSNR in dB, of the last steps above all; None before the first.
+        pending: The line of the last step read, while metrics.jsonl lacks it.
+    """
+
+    def __init__(self, run: Path):
+        self.path, self.psnr, self.pending = run / METRICS, None, None
+
+    def take(self, numbers: StepNumbers, seconds: float, progress: float, **others: object) -> bool:
+        """Takes in the numbers of a step, with other values of its line; returns whether the line is due."""
+        if numbers.complete:
+            psnr = -10.0 * math.log10(max(numbers.values["colour"], 1e-10))
+            self.psnr = psnr if self.psnr is None else 0.95 * self.psnr + 0.05 * psnr
+        n_rays, evaluated = numbers.n_rays, max(1, numbers.evaluated)
+        self.pending = {
+            "step": numbers.step, "seconds": round(seconds, 3), "progress": progress, "loss": numbers.loss,
+            **{f"loss_{name}": weight * numbers.values[name] for name, weight in numbers.weights.items()},
+            "psnr": self.psnr, "rays": n_rays, "samples_per_ray": numbers.evaluated / n_rays,
+            "kept": numbers.counts.samples / evaluated, "shaded": numbers.counts.shaded / evaluated,
+            "s": numbers.s, **others,
+        }  # fmt: skip
+        return numbers.step % LOG_EVERY == 0 or numbers.step <= LOG_EVERY
+
+    def write(self) -> dict[str, object]:
+        """Adds the pending line to metrics.jsonl, and returns it."""
+        line, self.pending = self.pending, None
+        add_metrics(self.path, line)
+        return line
+
+    def text(self, numbers: StepNumbers) -> str:
+        """The bar's text for a step: its number, the mean PSNR and the samples per ray."""
+        psnr = "" if self.psnr is None else f"PSNR {self.psnr:.2f} dB, "
+        return f"step {numbers.step} {psnr}{numbers.evaluated / numbers.n_rays:.1f} samples/ray"
 
 
 def read_metrics(path: Path) -> list[dict]:

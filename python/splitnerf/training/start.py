@@ -69,6 +69,10 @@ class StartShape:
         """The edge of a cell, scene units."""
         return 2 * self.box / len(self.distance)
 
+    def state(self) -> dict[str, Tensor]:
+        """What a checkpoint stores."""
+        return {"distance": self.distance, "trust": self.trust}
+
     def at(self, positions: Tensor) -> Tensor:
         """[n] distances at positions [n, 3], read linearly."""
         return read(self.distance, self.box, positions)

@@ -12,14 +12,15 @@ from splitnerf.data.images import read_image
 from splitnerf.errors import InputError
 from splitnerf.files import reason
 from splitnerf.notes import note
-from splitnerf.training.observer import Observed, Observer
+from splitnerf.training.observer import Event
 
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
 
 
-class TensorBoard(Observer):
-    """Writes the lines of metrics.jsonl as scalars and the previews as images; within a block, which closes the file.
+class TensorBoard:
+    """An observer that writes the lines of metrics.jsonl as scalars and the previews as images; within a block, which
+    closes the file.
 
     Args:
         folder: The folder of the event files; it is made when training begins.
@@ -40,7 +41,17 @@ class TensorBoard(Observer):
     def __enter__(self) -> TensorBoard:
         return self
 
-    def began(self, training: Observed) -> None:
+    def __call__(self, event: Event) -> None:
+        if event.kind == "begun":
+            self._begin(event.training.step)
+        elif event.kind == "logged":
+            numbers = {name: float(value) for name, value in event.line.items() if name != "step" and value is not None}
+            self._write(lambda writer: [writer.add_scalar(name, value, event.line["step"]) for name, value in numbers.items()])
+        elif event.kind == "previewed":
+            pixels, step = np.ascontiguousarray(read_image(event.path)[..., :3]), event.training.step
+            self._write(lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC"))
+
+    def _begin(self, step: int) -> None:
         """Steps of an earlier file after the one from which the run goes on come again.
 
         Raises:
@@ -50,15 +61,7 @@ class TensorBoard(Observer):
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{self._folder}: cannot be made ({reason(error)}); give --tensorboard another folder") from None
-        self._writer = self._make(str(self._folder), purge_step=training.step + 1)
-
-    def logged(self, line: dict[str, object]) -> None:
-        numbers = {name: float(value) for name, value in line.items() if name != "step" and value is not None}
-        self._write(lambda writer: [writer.add_scalar(name, value, line["step"]) for name, value in numbers.items()])
-
-    def previewed(self, picture: Path, step: int) -> None:
-        pixels = np.ascontiguousarray(read_image(picture)[..., :3])
-        self._write(lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC"))
+        self._writer = self._make(str(self._folder), purge_step=step + 1)
 
     def __exit__(self, *exception) -> None:
         self._write(lambda writer: writer.close())

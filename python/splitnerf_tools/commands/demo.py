@@ -34,7 +34,8 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.config import preset
     from splitnerf.data.frames import refuse_data
     from splitnerf.files import locked
-    from splitnerf.workflow import check_run, reconstruct
+    from splitnerf.pipeline import reconstruct
+    from splitnerf.run_folder import check_run
     from splitnerf_tools.demo.scene import write_demo_dataset
 
     if not args.max_minutes > 0:

@@ -32,7 +32,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.workflow import load_splits
+    from splitnerf.pipeline import load_splits
     from splitnerf_tools.inspection.checks import inspect
     from splitnerf_tools.inspection.inspect_page import write_page
 

@@ -13,7 +13,8 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background
 from splitnerf.data.truth import load_scene_truth
-from splitnerf.delivery import ASSET_FILES, REPORT_VIEWS, is_refined
+from splitnerf.pipeline import REPORT_VIEWS
+from splitnerf.run_folder import ASSET_FILES, is_refined
 from splitnerf.evaluate.asset import asset_predictions
 from splitnerf.evaluate.jobs import Evaluated
 from splitnerf.fields.light import panorama_directions

@@ -16,7 +16,8 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.normalisation import transform_points
 from splitnerf.errors import InputError, plain
 from splitnerf.training.metrics import METRICS, read_metrics
-from splitnerf.training.observer import Observed, Observer, Wish
+from splitnerf.training.observer import Event, Request
+from splitnerf.training.loop import Training
 from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedLight
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.training_asset import training_asset, training_glb
@@ -25,13 +26,13 @@ STATE_EVERY = 0.5  # seconds between two states
 # least seconds between two surfaces, and the largest share of the time that they take
 ASSET_EVERY, ASSET_SHARE = 4.0, 0.05
 LIGHT_HEIGHT = 64  # rows of the light while it is recovered
-WISHES = {"pause": Wish.PAUSE, "checkpoint": Wish.SAVE, "stop": Wish.STOP}  # of the buttons; "resume" takes one back
+REQUESTS = {"pause": Request.PAUSE, "checkpoint": Request.SAVE, "stop": Request.STOP}  # of the buttons; "resume" takes one back
 ANSWERS = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
 CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
 
 
-class Live(Observer):
-    """Shows a run in the page while it trains. As long as no page is open, it does nothing between steps.
+class Live:
+    """An observer that shows a run in the page while it trains. As long as no page is open, it does nothing between steps.
 
     Args:
         name: The name of the run in the page.
@@ -51,7 +52,7 @@ class Live(Observer):
         self._frame(np.eye(4))
         self.shown.sources.append(Source(name, self.shown.frame, bytes, self._light, version=0))
         self._lines: list[dict] = []
-        self._asked: set[Wish] = set()
+        self._requested: set[Request] = set()
         self._lock = threading.Lock()
         self._began = (0.0, 0.0)  # seconds and progress
         self._state_at = self._asset_at = -float("inf")
@@ -64,27 +65,35 @@ class Live(Observer):
 
     # ---- called by the training's thread ----
 
-    def began(self, training: Observed) -> None:
+    def __call__(self, event: Event) -> Request | None:
+        if event.kind == "step":
+            return self._between_steps(event.training)
+        if event.kind == "begun":
+            self._begin(event.training)
+        elif event.kind == "logged":
+            self._lines.append(_curves_of(event.line))
+        elif event.training is None:
+            self._deliver(event.kind, event.path)
+        return None
+
+    def _begin(self, training: Training) -> None:
         self._world_from_box = np.linalg.inv(training.dataset.box_from_world)
         self._frame(self._world_from_box)
         self._lines = [_curves_of(line) for line in read_metrics(training.run / METRICS)]
         self._began = training.seconds, training.progress
         self._tell(training, stage="training")
 
-    def logged(self, line: dict[str, object]) -> None:
-        self._lines.append(_curves_of(line))
-
-    def between_steps(self, training: Observed) -> Wish | None:
+    def _between_steps(self, training: Training) -> Request | None:
         if self._saving:
             self._saving = False
             self._tell(training, saved=training.step)
         if self.events.listeners:
             self._show(training)
-        return self._wish() if self._asked else None
+        return self._request() if self._requested else None
 
-    def delivering(self, stage: str, folder: Path | None = None) -> None:
+    def _deliver(self, stage: str, folder: Path | None) -> None:
         with self._lock:
-            self._asked.clear()
+            self._requested.clear()
         changes = {}
         if folder is not None and (folder / "mesh.glb").is_file():
             self._delivered, changes = folder, {"version": self.shown.sources[0].version + 1}
@@ -98,15 +107,15 @@ class Live(Observer):
         Raises:
             InputError: There is no such button, or the run does not train.
         """
-        if button not in {*WISHES, "resume"}:
+        if button not in {*REQUESTS, "resume"}:
             raise InputError("there is no such button")
         with self._lock:
             if self.events.state["stage"] != "training":
                 raise InputError("the run does not train now")
             if button == "resume":
-                self._asked.discard(Wish.PAUSE)
+                self._requested.discard(Request.PAUSE)
             else:
-                self._asked.add(WISHES[button])
+                self._requested.add(REQUESTS[button])
         if button in ("pause", "resume"):
             self.events.update(paused=button == "pause")
         if button in ANSWERS:
@@ -146,7 +155,7 @@ class Live(Observer):
             "frame", transform_points(world_from_box, corners), np.int32([[0, 1, 2], [3, 4, 5]]), corners, np.zeros(2, np.int32)
         )
 
-    def _tell(self, training: Observed, **changes: object) -> None:
+    def _tell(self, training: Training, **changes: object) -> None:
         steps, (seconds, progress) = training.config.run.steps, self._began
         gained, left = training.progress - progress, None
         if gained > 0:
@@ -154,10 +163,10 @@ class Live(Observer):
         self._state_at = time.monotonic()
         self.events.update(
             step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
-            psnr=_rounded(training.psnr_mean), lines=len(self._lines), **changes,
+            psnr=_rounded(training.log.psnr), lines=len(self._lines), **changes,
         )  # fmt: skip
 
-    def _show(self, training: Observed) -> None:
+    def _show(self, training: Training) -> None:
         """Sends the state if the last one is old enough, with a new surface if one is wanted."""
         now = time.monotonic()
         if now - self._state_at < STATE_EVERY:
@@ -170,7 +179,7 @@ class Live(Observer):
             self._cost = self._asset_at - now
         self._tell(training, version=version)
 
-    def _update_asset(self, training: Observed) -> int:
+    def _update_asset(self, training: Training) -> int:
         """Updates surface and light; returns the asset's version."""
         old, self._asset_step = self.shown.sources[0], training.step
         try:
@@ -182,13 +191,13 @@ class Live(Observer):
         self.shown.sources[0] = Source(self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1)
         return old.version + 1
 
-    def _wish(self) -> Wish | None:
+    def _request(self) -> Request | None:
         with self._lock:
-            if Wish.SAVE in self._asked:
-                self._asked.discard(Wish.SAVE)
+            if Request.SAVE in self._requested:
+                self._requested.discard(Request.SAVE)
                 self._saving = True
-                return Wish.SAVE
-            return next((wish for wish in (Wish.STOP, Wish.PAUSE) if wish in self._asked), None)
+                return Request.SAVE
+            return next((request for request in (Request.STOP, Request.PAUSE) if request in self._requested), None)
 
 
 def _curves_of(line: dict[str, object]) -> dict[str, object]:

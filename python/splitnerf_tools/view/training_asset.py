@@ -10,7 +10,7 @@ from splitnerf.data.normalisation import transform_points
 from splitnerf.export.glb import glb_content
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import surface_materials
-from splitnerf.outputs import surface_of
+from splitnerf.export.scene import surface_of
 from splitnerf.render.model import SceneModel
 
 RESOLUTION = 128  # nodes along an edge of the box

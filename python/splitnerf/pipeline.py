@@ -1,4 +1,8 @@
-"""Whole jobs: reconstruct a dataset into a run folder, evaluate a run again, and the demo."""
+"""Whole jobs: reconstruct a dataset into a run's folder, score a run again, export it.
+
+A run goes from photos to files: :func:`reconstruct` loads the splits, trains, and :func:`deliver`s: it exports the trained
+asset, refines it, scores what is delivered and has the report written.
+"""
 
 from __future__ import annotations
 
@@ -10,39 +14,40 @@ from dataclasses import replace
 from pathlib import Path
 
 import torch
+import trimesh
 
 from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
-from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, spread
+from splitnerf.data.environment import read_environment
 from splitnerf.data.exposures import EXPOSURES, write_exposures
 from splitnerf.data.frames import has_test_split, refuse_data, split_rule
-from splitnerf.data.json_files import write_json
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
-from splitnerf.delivery import REFINEMENT_FILES, discard_refinement, finish, is_refined, score_run, write_run_report
-from splitnerf.devices import refuse_one_processor
+from splitnerf.devices import same_bits
 from splitnerf.errors import InputError
-from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path
+from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
+from splitnerf.export.meshing import EmptyMesh
+from splitnerf.export.scene import Exported, write_assets
 from splitnerf.files import atomic_path, locked
-from splitnerf.notes import note_once
-from splitnerf.outputs import Exported, write_assets
+from splitnerf.notes import note, note_once
 from splitnerf.plugins import installed
-from splitnerf.refinement.job import STATE
+from splitnerf.refinement.fit import RefinementSettings
+from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_state, refine_folder, refinement_summary
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
-from splitnerf.training.checkpoint import config_of, load_checkpoint, restore_model, restored_grid
-from splitnerf.training.loop import TrainedScene, begin_training, check_repeatable, check_same_scene
+from splitnerf.run_folder import ORIGIN, check_run, clear_run, discard_refinement, is_refined, move_assets
+from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
+from splitnerf.training.loop import TrainedScene, Training, check_repeatable
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.metrics import METRICS
-from splitnerf.training.observer import Observer
+from splitnerf.training.observer import NOBODY, Event, Observer
 from splitnerf.training.schedule import progress_of
 
-ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
-RUN_FILES = (
-    "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *REFINEMENT_FILES,
-)  # fmt: skip
+REPORT_VIEWS = 4
+VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path tracing at its end, REPORT_VIEWS views aside
 
 
 def load_splits(
@@ -64,52 +69,6 @@ def load_splits(
     return train, test
 
 
-def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Checks that a run can be made here, and what stands where it is to be.
-
-    Raises:
-        InputError: The folder holds a run or a data set, the path is not a folder, or the machine has one processor.
-    """
-    refuse_one_processor()
-    if run.exists() and not run.is_dir():
-        raise InputError(f"{run}: is a file; give --out a folder")
-    refuse_data(run)
-    if not (resume or overwrite) and present_in(run):
-        raise InputError(
-            f"{run}: holds a run already; continue with --resume, replace it with --overwrite, or give another --out"
-        )
-
-
-def present_in(run: Path) -> list[str]:
-    """The files of a run that a folder holds."""
-    return [name for name in RUN_FILES if (run / name).exists()]
-
-
-def clear_run(run: Path) -> None:
-    """Deletes the files of a run, and nothing else."""
-    discard_refinement(run)
-    for name in RUN_FILES:
-        (run / name).unlink(missing_ok=True)
-    for preview in (run / "previews").glob("step_*.png"):
-        preview.unlink()
-
-
-def begin_or_resume(run: Path) -> tuple[bool, bool]:
-    """Whether to resume the run of a folder, or to overwrite it: one that ended before its first checkpoint."""
-    if (run / "checkpoint.pt").is_file():
-        return True, False
-    return False, set(present_in(run)) <= {"config.toml", METRICS}
-
-
-def is_finished(run: Path) -> bool:
-    """Whether a run has delivered what its checkpoint holds: the last file is the report or, where nothing writes one, the
-    evaluation; then its state goes."""
-    checkpoint, last = run / "checkpoint.pt", run / ("report.html" if installed().write_report else "evaluation.json")
-    if not (checkpoint.is_file() and last.is_file()) or (run / STATE).exists():
-        return False
-    return last.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
-
-
 def reconstruct(
     data: Path,
     run: Path,
@@ -119,9 +78,9 @@ def reconstruct(
     device: torch.device | str = "cpu",
     resume: bool = False,
     overwrite: bool = False,
-    observers: Sequence[Observer] = (),
+    observer: Observer = NOBODY,
 ) -> tuple[TrainedScene, dict | None]:
-    """Trains on a dataset, fills the run's folder and calls the observers. Returns the scene and, when finished, its
+    """Trains on a dataset, fills the run's folder and calls the observer. Returns the scene and, when finished, its
     evaluation.
 
     Raises:
@@ -132,7 +91,8 @@ def reconstruct(
     with locked(run):
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
-        training = begin_training(dataset, config, run, torch.device(device), resume=resume, observers=observers)
+        training = Training(dataset, config, run, torch.device(device), observer)
+        training.begin(resume)
         begin_run(run, config, dataset, overwrite)
         trained = training.complete()
         if not trained.finished:
@@ -141,7 +101,7 @@ def reconstruct(
         if trained.exposures is not None:
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
-        return trained, finish(trained, dataset, test, run, resume=resume, observers=training.observers)
+        return trained, deliver(trained, dataset, test, run, resume=resume, observer=observer)
 
 
 def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> None:
@@ -177,6 +137,119 @@ def load_with_masks(
     return config, *load_splits(data, downscale, replace(reading, separated=folder))
 
 
+def deliver(
+    trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool, observer: Observer = NOBODY
+) -> dict | None:
+    """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
+
+    Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
+
+    Args:
+        trained: The scene.
+        dataset, test: The train split, and the test split or None.
+        run: The run's folder.
+        resume: Whether to continue the refinement, if the scene has not changed since it was interrupted.
+        observer: Learns which stage begins.
+
+    Returns:
+        The evaluation; None where the refinement was interrupted.
+    """
+    config, timings, mesh, failure = trained.model.config, {"training": trained.seconds}, None, None
+    refines = config.refinement.enabled
+    if not (refines and resume and trained.n_new == 0 and (run / STATE).is_file()):
+        observer(Event("export"))
+        clock = time.monotonic()
+        discard_refinement(run)
+        try:
+            mesh = write_assets(run, trained.model, dataset.box_from_world, Cameras.of(dataset)).mesh
+        except EmptyMesh as error:
+            failure = error
+        timings["export"] = time.monotonic() - clock
+    if refines and not failure and not refine_trained(run, dataset, config, resume, observer):
+        return None
+    observer(Event("evaluation", path=run))
+    clock = time.monotonic()
+    views = test if test is not None else dataset
+    if is_refined(run):
+        n = max(REPORT_VIEWS, VIEW_BUDGET // (views.height * views.width))
+        views = views.select(spread(range(len(views)), min(n, len(views))))
+    evaluated = score_run(run, trained.model, trained.grid, views, mesh, timings, {}, Protocol.spp)
+    write_json(run / "evaluation.json", evaluated.scores)
+    timings["evaluation"] = time.monotonic() - clock
+    write_run_report(run, trained.model, evaluated, timings)
+    forget_state(run)
+    if failure:
+        raise failure
+    return evaluated.scores
+
+
+def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observer: Observer) -> bool:
+    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained.
+
+    Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
+
+    Returns:
+        False where it was interrupted.
+
+    Raises:
+        RuntimeError: Numbers are no longer finite; the run delivers what training exported.
+        OSError: A file cannot be written.
+    """
+    if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
+        move_assets(run, run / TRAINED)
+    observer(Event("refinement", path=run / TRAINED))
+    settings = RefinementSettings(
+        sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
+    )
+    try:
+        with same_bits(config.run.deterministic):
+            refined = refine_folder(
+                run / TRAINED, dataset, run, settings, resume=resume, save_minutes=config.run.checkpoint_minutes
+            )
+    except OtherState:
+        raise
+    except InputError as error:
+        move_assets(run / TRAINED, run)
+        note(f"{run}: without refinement, as {error}")
+        return True
+    except RuntimeError:
+        move_assets(run / TRAINED, run)
+        raise
+    return refined is not None
+
+
+def score_run(
+    run: Path, model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, timings: dict[str, float],
+    maps: dict[str, Path], spp: int,
+) -> Evaluated:  # fmt: skip
+    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields. Where
+    the run learned exposures, each view gets one by its own image.
+
+    Args:
+        run: The run's folder.
+        model, grid: The trained scene.
+        views: The views.
+        mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
+        timings: Seconds by part, "training" at least; that of a refinement is added.
+        maps: Environment maps of relit views by name, which are rendered of mesh.glb.
+        spp: Paths a pixel.
+    """
+    asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
+    free = (run / EXPOSURES).is_file()
+    if is_refined(run):
+        timings["refinement"] = read_json(run / RECORD, "seconds")["seconds"]
+        seconds = round(timings["training"] + timings["refinement"], 1)
+        evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds, free)
+        return replace(evaluated, scores=evaluated.scores | {"refinement": refinement_summary(run)})
+    return score_fields(model, grid, views, mesh, asset, maps, spp, timings["training"], free)
+
+
+def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
+    """report.html, where a plugin writes it."""
+    if (write_report := installed().write_report) is not None:
+        write_report(run, model, evaluated, timings)
+
+
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself.
 
@@ -199,7 +272,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
 
 
 def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = None) -> Evaluated:
-    """Scores again what a run delivers, see :func:`splitnerf.delivery.score_run`, with relit views of its mesh.glb.
+    """Scores again what a run delivers, see :func:`score_run`, with relit views of its mesh.glb.
 
     Args:
         run: The run's folder; its meshes and environment do not change.
@@ -237,7 +310,7 @@ def export_run(
     texture_size: int | None = None,
     resolution: int | None = None,
 ) -> Exported:
-    """Writes a run's meshes and light into a folder, see :func:`splitnerf.outputs.write_assets`.
+    """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`.
 
     Raises:
         InputError: The run cannot be used, or a format needs a package that is not installed.

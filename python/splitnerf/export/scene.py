@@ -1,4 +1,4 @@
-"""The outputs of a run: previews, meshes, the environment, the evaluation and the report."""
+"""Writes what a trained scene holds as files: the surface as a mesh, textured or not, and the light."""
 
 from __future__ import annotations
 
@@ -12,12 +12,7 @@ import torch
 import trimesh
 from torch import Tensor
 
-from splitnerf.data.dataset import Dataset
 from splitnerf.data.normalisation import transform_points
-from splitnerf.data.truth import load_scene_truth, load_view_truths
-from splitnerf.evaluate.exposure import exposed_like
-from splitnerf.evaluate.lpips import Distance
-from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.export.mesh import write_mesh_ply
@@ -27,14 +22,11 @@ from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_clo
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.usdz import require_usd, write_usdz
-from splitnerf.progress import Progress, tracked
-from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid
-from splitnerf.render.renderer import render_maps
+from splitnerf.progress import Progress
+from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
 from splitnerf.render.seen import Cameras, seen_vertices
 
 FORMATS = ("glb", "ply", "obj", "usdz")
-ENVIRONMENT_ROWS = 128  # of the image of the light
 
 
 @dataclass(frozen=True)
@@ -125,11 +117,11 @@ def surface_of(model: SceneModel) -> Surface:
     them."""
 
     def from_cpu(field: Callable[[Tensor], Tensor | tuple]) -> Callable[[Tensor], Tensor | tuple]:
-        def asked(points: Tensor) -> Tensor | tuple:
+        def values_at(points: Tensor) -> Tensor | tuple:
             values = field(points.to(model.device))
             return values.cpu() if isinstance(values, Tensor) else tuple(value.cpu() for value in values)
 
-        return asked
+        return values_at
 
     def gradient(points: Tensor) -> tuple[Tensor, Tensor]:
         field = model.surface(points)
@@ -141,31 +133,3 @@ def surface_of(model: SceneModel) -> Surface:
         return (*material, torch.nn.functional.normalize(field.gradient, dim=1))
 
     return Surface(*map(from_cpu, (model.sdf_field.sdf, gradient, materials)))
-
-
-def evaluate_scene(
-    model: SceneModel,
-    grid: OccupancyGrid,
-    test: Dataset,
-    mesh: trimesh.Trimesh | None,
-    seconds: float,
-    relight: dict | None = None,
-    distance: Distance | None = None,
-    free_exposure: bool = False,
-) -> tuple[dict, list[dict[str, np.ndarray]], Dataset]:
-    """Renders all test views from the fields and scores them; see :func:`splitnerf.evaluate.protocol.evaluate_maps`.
-
-    Returns:
-        The contents of evaluation.json, the rendered maps, and the views, with exposures that were fitted with `free_exposure`.
-    """
-    predictions = [render_maps(model, grid, test, i) for i in tracked(range(len(test)), "evaluation, view")]
-    if free_exposure:
-        test = exposed_like(test, predictions)
-    truth = load_scene_truth(test.root, test.origin)
-    light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
-    result = evaluate_maps(
-        predictions, test, load_view_truths(test), light, truth.light, mesh, truth.mesh, round(seconds, 1),
-        relight=relight, distance=distance,
-    )  # fmt: skip
-    result |= {"exposures": "fitted"} if free_exposure else {}
-    return result | {"scored": "fields"}, predictions, test

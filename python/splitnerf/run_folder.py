@@ -1,0 +1,94 @@
+"""A run's folder: the files that it may hold, whether a run can be made there, and what it delivers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from splitnerf.data.exposures import EXPOSURES
+from splitnerf.data.frames import refuse_data
+from splitnerf.devices import refuse_one_processor
+from splitnerf.errors import InputError
+from splitnerf.plugins import installed
+from splitnerf.refinement.job import RECORD, STATE, TRAINED
+from splitnerf.training.metrics import METRICS
+
+ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
+ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
+REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
+RUN_FILES = (
+    "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
+    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *REFINEMENT_FILES,
+)  # fmt: skip
+
+
+def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
+    """Checks that a run can be made here, and what stands where it is to be.
+
+    Raises:
+        InputError: The folder holds a run or a data set, the path is not a folder, or the machine has one processor.
+    """
+    refuse_one_processor()
+    if run.exists() and not run.is_dir():
+        raise InputError(f"{run}: is a file; give --out a folder")
+    refuse_data(run)
+    if not (resume or overwrite) and present_in(run):
+        raise InputError(
+            f"{run}: holds a run already; continue with --resume, replace it with --overwrite, or give another --out"
+        )
+
+
+def present_in(run: Path) -> list[str]:
+    """The files of a run that a folder holds."""
+    return [name for name in RUN_FILES if (run / name).exists()]
+
+
+def clear_run(run: Path) -> None:
+    """Deletes the files of a run, and nothing else."""
+    discard_refinement(run)
+    for name in RUN_FILES:
+        (run / name).unlink(missing_ok=True)
+    for preview in (run / "previews").glob("step_*.png"):
+        preview.unlink()
+
+
+def begin_or_resume(run: Path) -> tuple[bool, bool]:
+    """Whether to resume the run of a folder, or to overwrite it: one that ended before its first checkpoint."""
+    if (run / "checkpoint.pt").is_file():
+        return True, False
+    return False, set(present_in(run)) <= {"config.toml", METRICS}
+
+
+def is_finished(run: Path) -> bool:
+    """Whether a run has delivered what its checkpoint holds: the last file is the report or, where nothing writes one, the
+    evaluation; then its state goes."""
+    checkpoint, last = run / "checkpoint.pt", run / ("report.html" if installed().write_report else "evaluation.json")
+    if not (checkpoint.is_file() and last.is_file()) or (run / STATE).exists():
+        return False
+    return last.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
+
+
+def is_refined(run: Path) -> bool:
+    """Whether a run delivers what a refinement fitted."""
+    return (run / RECORD).is_file() and (run / "mesh.glb").is_file()
+
+
+def export_folder(run: Path) -> Path:
+    """Where a run's trained asset is written: the run, or RUN/trained where the run delivers a refined one."""
+    return run / TRAINED if is_refined(run) else run
+
+
+def move_assets(source: Path, target: Path) -> None:
+    """Moves the asset and its light, as far as they are there."""
+    target.mkdir(exist_ok=True)
+    for name in ASSET_FILES:
+        if (source / name).is_file():
+            os.replace(source / name, target / name)
+
+
+def discard_refinement(run: Path) -> None:
+    """Deletes the files of a refinement except the asset, and those it started from."""
+    for name in REFINEMENT_FILES:
+        (run / name).unlink(missing_ok=True)
+    if (run / TRAINED).is_dir() and not any((run / TRAINED).iterdir()):
+        (run / TRAINED).rmdir()
