@@ -1,6 +1,6 @@
 """The cost of many large photos: the time to the first step, the memory, the file, and the time of a step.
 
-    python tests/bench/large_inputs.py [--photos 100 300 1000] [--max-memory GB ...] [--folder DIR] [--out PAGE]
+    python tests/bench/large_inputs.py [--photos 100 300 1000] [--max-memory GB ...] [--folder DIR]
 
 Each row is one `splitnerf train` on photos of 12 megapixels, JPEG with masks, of a striped ball that looks the same
 from all sides; it is ended after STEPS steps. The memory is the process's largest resident set before the end.
@@ -22,20 +22,13 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-from splitnerf_tools.bench.provenance import header, provenance
+from splitnerf.relight.cameras import look_at
 
 WIDTH, HEIGHT, FOCAL = 4000, 3000, 4200.0
 DISTANCE = 3.0
 ELEVATIONS = 0.2, 0.5, 0.9, 1.2  # radians
 FIRST, STEPS = 20, 220  # steps that are not timed, and the last one
 TIMEOUT = 3600.0  # seconds to the first step
-SOURCES = ("tests/bench/large_inputs.py", "python/splitnerf/data", "python/splitnerf/render/averages.py", "python/splitnerf/render/rays.py",
-           "python/splitnerf/training")  # fmt: skip
-INTRODUCTION = """# Large inputs
-
-Photos of 4000 x 3000 pixels: the time from the command to the first step, the largest resident memory of the process until
-step 220, the file beside it where the photos exceed the budget, and the time of a step.
-"""
 
 
 class Row(NamedTuple):
@@ -47,19 +40,9 @@ class Row(NamedTuple):
     step: float
 
 
-def pose(azimuth: float, elevation: float) -> np.ndarray:
-    """[4, 4] camera-to-world of a camera that looks at the origin, OpenGL axes."""
-    back = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    right = np.cross([0, 0, 1], back)
-    right /= np.linalg.norm(right)
-    result = np.eye(4)
-    result[:3] = np.column_stack([right, np.cross(back, right), back, DISTANCE * back])
-    return result
-
-
 def photo(elevation: float) -> tuple[Image.Image, Image.Image]:
     """A photo and its mask of a unit ball with horizontal stripes, before a rough background."""
-    camera = pose(0.0, elevation)
+    camera = look_at(np.zeros(3), 0.0, elevation, DISTANCE)
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32) + 0.5
     local = np.stack([(x - WIDTH / 2) / FOCAL, (HEIGHT / 2 - y) / FOCAL, -np.ones_like(x)], axis=-1)
     rays = local @ camera[:3, :3].T.astype(np.float32)
@@ -88,7 +71,7 @@ def write_photos(folder: Path, n: int) -> None:
         kind = i % len(ELEVATIONS)
         for suffix in ("jpg", "png"):
             os.link(kept / f"{kind}.{suffix}", folder / f"{i:04d}.{suffix}")
-        matrix = pose(2 * np.pi * i / n, ELEVATIONS[kind]).tolist()
+        matrix = look_at(np.zeros(3), 2 * np.pi * i / n, ELEVATIONS[kind], DISTANCE).tolist()
         frames.append({"file_path": f"{i:04d}.jpg", "mask_path": f"{i:04d}.png", "transform_matrix": matrix})
     lens = {"w": WIDTH, "h": HEIGHT, "fl_x": FOCAL, "fl_y": FOCAL, "cx": WIDTH / 2, "cy": HEIGHT / 2}
     (folder / "transforms.json").write_text(json.dumps(lens | {"mask_kind": "object", "frames": frames}))
@@ -143,10 +126,8 @@ def main() -> int:
     parser.add_argument("--photos", type=int, nargs="+", default=[100, 300, 1000])
     parser.add_argument("--max-memory", type=float, nargs="+", default=[None], metavar="GB")
     parser.add_argument("--folder", type=Path, default=None, help="where data are written for the time of the measurement")
-    parser.add_argument("--out", type=Path, help="a page to write")
     args = parser.parse_args()
-    table = ["| photos | --max-memory | to the first step | memory | file | step |", "|---|---|---|---|---|---|"]
-    print("\n".join(table), flush=True)
+    print("| photos | --max-memory | to the first step | memory | file | step |\n|---|---|---|---|---|---|", flush=True)
     if args.folder is not None:
         args.folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=args.folder) as folder:
@@ -156,13 +137,9 @@ def main() -> int:
             for budget in args.max_memory:
                 row = measure(data, Path(folder) / "run", budget)
                 told = "default" if budget is None else f"{budget:g} GB"
-                table.append(
-                    f"| {n} | {told} | {row.start:.0f} s | {row.memory:.1f} GiB | {row.file:.1f} GiB | {row.step:.0f} ms |"
-                )
-                print(table[-1], flush=True)
+                times = f"{row.start:.0f} s | {row.memory:.1f} GiB | {row.file:.1f} GiB | {row.step:.0f} ms"
+                print(f"| {n} | {told} | {times} |", flush=True)
                 shutil.rmtree(Path(folder) / "run")
-    if args.out:
-        args.out.write_text("\n".join([INTRODUCTION, header(provenance(SOURCES)), "", *table, ""]))
     return 0
 
 
