@@ -81,7 +81,7 @@ TEST(PathTracer, GreySphereUnderConstantLightReflectsItsDirectionalAlbedo) {
   for (float& texel : s.map) texel = 2.f;
   s.params.samples_per_pixel = 1024;
   const Image image = s.render();
-  const Vec table = lookup_brdf_lut(brdf_lut(), 1.f, 1.f);
+  const Vec table = sample_brdf_lut(brdf_lut(), 1.f, 1.f).value;
   const float gain = 1 + 0.04f * (1 / (table.x + table.y) - 1);
   const float e = sample_brdf_lut(brdf_lut(), 1.f, 1.f).dielectric * gain;
   for (int c = 0; c < 3; ++c) {
@@ -109,7 +109,7 @@ TEST(PathTracer, DiffuseSphereUnderTheSkyFollowsTheCosineLaw) {
     const Vec eye{s.camera.camera_to_world[3], s.camera.camera_to_world[7], s.camera.camera_to_world[11]};
     const float cosine = dot(normal, normalize(eye - normal));
     if (cosine < 0.3f) continue;
-    const Vec table = lookup_brdf_lut(brdf_lut(), cosine, 1.f);
+    const Vec table = sample_brdf_lut(brdf_lut(), cosine, 1.f).value;
     const float gain = 1 + 0.04f * (1 / (table.x + table.y) - 1);
     const float e = sample_brdf_lut(brdf_lut(), cosine, 1.f).dielectric * gain;
     const double expected = (1 - e) * 0.5 * (1 + normal.z) / 2;

@@ -129,7 +129,7 @@ TEST(Prefilter, RotatedFibonacciErrorAtTheRoughestIsSmall) {
     const std::vector<double> roughness(n, rho), reference = gbar(queries, roughness, fine);
     double error = 0, iid_error = 0, scale = 0;
     for (int turn = 0; turn < 8; ++turn) {
-      const Lights turned = lattice(8192, random_rotation(random.uniform(), random.uniform(), random.uniform()), sky);
+      const Lights turned = lattice(8192, Frame<double>(random.direction()), sky);
       Lights iid{random.directions(8192), std::vector<double>(3 * 8192)};
       for (int i = 0; i < 8192; ++i) store3(&iid.radiance[3 * i], sky(load3(&iid.directions[3 * i])));
       const std::vector<double> got = gbar(queries, roughness, turned), noisy = gbar(queries, roughness, iid);

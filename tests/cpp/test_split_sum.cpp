@@ -13,13 +13,13 @@ constexpr FresnelMode kModes[] = {FresnelMode::kExact, FresnelMode::kPaper, Fres
 TEST(BrdfTable, RoughestNormalIncidenceIsOneMinusLogTwo) {
   const LobeIntegrals fine = integrate_brdf(1, 1, 16000);
   EXPECT_NEAR(fine.f1 + fine.f2, 1 - std::log(2.0), 1e-5);
-  const Vec3<double> table = lookup_brdf_lut(brdf_lut(), 1.0, 1.0);
+  const Vec3<double> table = sample_brdf_lut(brdf_lut(), 1.0, 1.0).value;
   EXPECT_NEAR(table.x + table.y, 1 - std::log(2.0), 1e-4);
 }
 
 TEST(BrdfTable, MirrorKeepsAllLight) {
   for (const double nv : {0.2, 0.5, 1.0}) {
-    const Vec3<double> table = lookup_brdf_lut(brdf_lut(), nv, 0.0);
+    const Vec3<double> table = sample_brdf_lut(brdf_lut(), nv, 0.0).value;
     EXPECT_NEAR(table.x + table.y, 1, 2e-3) << nv;
     EXPECT_NEAR(table.y, pow5(1 - nv), 4e-3) << nv;
     EXPECT_NEAR(table.z, 1, 1e-6) << nv;
@@ -34,11 +34,11 @@ TEST(BrdfTable, ChiMatchesMeasuredLobes) {
     for (int v = 0; v < 3; ++v) {
       EXPECT_NEAR(integrate_brdf(n_dot_v[v], roughness[r], 50000).chi, chi[r][v], 2e-3)
           << roughness[r] << " " << n_dot_v[v];
-      EXPECT_NEAR(lookup_brdf_lut(brdf_lut(), n_dot_v[v], roughness[r]).z, chi[r][v], 6e-3)
+      EXPECT_NEAR(sample_brdf_lut(brdf_lut(), n_dot_v[v], roughness[r]).value.z, chi[r][v], 6e-3)
           << roughness[r] << " " << n_dot_v[v];
     }
   }
-  for (const double nv : n_dot_v) EXPECT_NEAR(lookup_brdf_lut(brdf_lut(), nv, 1.0).z, 0, 1e-3);
+  for (const double nv : n_dot_v) EXPECT_NEAR(sample_brdf_lut(brdf_lut(), nv, 1.0).value.z, 0, 1e-3);
 }
 
 TEST(BrdfTable, InterpolatesAFinerQuadrature) {
@@ -97,7 +97,7 @@ TEST(BrdfTable, DerivativesFollowTheValues) {
     std::vector<double> x{random.uniform(0.01, 1), random.uniform()};
     const LutSample<double> s = sample_brdf_lut(brdf_lut(), x[0], x[1]);
     for (int c = 0; c < 3; ++c)
-      expect_gradient([&] { return lookup_brdf_lut(brdf_lut(), x[0], x[1])[c]; }, x, {s.d_n_dot_v[c], s.d_roughness[c]},
+      expect_gradient([&] { return sample_brdf_lut(brdf_lut(), x[0], x[1]).value[c]; }, x, {s.d_n_dot_v[c], s.d_roughness[c]},
                       1e-6, "table", 1e-6 * x[0]);
     expect_gradient([&] { return sample_brdf_lut(brdf_lut(), x[0], x[1]).dielectric; }, x,
                     {s.dielectric_by_n_dot_v, s.dielectric_by_roughness}, 1e-6, "dielectric", 1e-6 * x[0]);

@@ -13,14 +13,6 @@ template <class T> SPLITNERF_HD T ggx_alpha_from_roughness(T roughness) {
   return max_of(roughness * roughness, T(kMinGgxAlpha));
 }
 
-// sin^2 of the angle between unit vectors from their difference: with d2 = |a - b|^2 = 2 - 2 cos,
-// sin^2 = 1 - cos^2 = d2 (1 - d2/4). 1 - dot^2 would lose all digits where the angle is small.
-template <class T> SPLITNERF_HD T sin2_between(Vec3<T> a, Vec3<T> b) {
-  const Vec3<T> d = a - b;
-  const T d2 = dot(d, d);
-  return d2 * (T(1) - T(0.25) * d2);
-}
-
 // sin^2 of the half angle: |a - b|^2 / 4. With n = v = w_r the microfacet normal h halves the
 // angle between w_r and w, so this is sin^2(theta_h) of the pre-integration lobe.
 template <class T> SPLITNERF_HD T sin2_half_angle(Vec3<T> a, Vec3<T> b) {

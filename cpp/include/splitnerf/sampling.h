@@ -78,17 +78,6 @@ template <class T> SPLITNERF_HD Vec3<T> fibonacci_sphere(uint32_t i, uint32_t n)
   return sample_uniform_sphere(u.x, u.y);
 }
 
-// Uniformly random rotation (Haar measure) as the frame that it maps the axes to: a uniform pole
-// and a uniform twist about it. It turns a fixed lattice into an unbiased one.
-template <class T> SPLITNERF_HD Frame<T> random_rotation(T u1, T u2, T u3) {
-  const Frame<T> pole(sample_uniform_sphere(u1, u2));
-  const T c = std::cos(T(2 * kPi) * u3), s = std::sin(T(2 * kPi) * u3);
-  Frame<T> turned = pole;
-  turned.tangent = pole.tangent * c + pole.bitangent * s;
-  turned.bitangent = pole.bitangent * c - pole.tangent * s;
-  return turned;
-}
-
 // ---- cosine lobe -----------------------------------------------------------------------------
 
 // Density c / pi: the CDF of c is c^2, so c = sqrt(1 - u1), 1 - c = u1 / (1 + c).
@@ -136,13 +125,6 @@ template <class T> SPLITNERF_HD T invert_y_minus_log1p(T t) {
   return bound < T(1e-12) ? bound : y;
 }
 
-// int D (w.z)+ dw over the hemisphere, the lobe's normalisation.
-template <class T> SPLITNERF_HD T ggx_lobe_integral(T ggx_alpha) {
-  const T a2 = ggx_alpha * ggx_alpha, b = T(0.5) * (T(1) - a2);
-  if (b < T(kCosineLobeLimit)) return T(1);
-  return T(2) * a2 / (b * b) * y_minus_log1p(b / a2);
-}
-
 // y1 of a lobe, or 0 where it is taken as the cosine lobe.
 template <class T> SPLITNERF_HD T ggx_lobe_edge(T ggx_alpha) {
   const T a2 = ggx_alpha * ggx_alpha, b = T(0.5) * (T(1) - a2);
@@ -155,13 +137,6 @@ template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe_of_edge(T u1, T u2, T y1
 template <class T> SPLITNERF_HD Vec3<T> sample_ggx_lobe(T u1, T u2, T ggx_alpha) {
   const T y1 = ggx_lobe_edge(ggx_alpha);
   return y1 > T(0) ? sample_ggx_lobe_of_edge(u1, u2, y1) : sample_cosine_hemisphere(u1, u2);
-}
-
-// Density of sample_ggx_lobe at the unit vector w; zero below the horizon.
-template <class T> SPLITNERF_HD T pdf_ggx_lobe(Vec3<T> w, T ggx_alpha) {
-  if (T(0.5) * (T(1) - ggx_alpha * ggx_alpha) < T(kCosineLobeLimit)) return pdf_cosine_hemisphere(w.z);
-  const T sin2_h = sin2_half_angle(w, Vec3<T>{T(0), T(0), T(1)});
-  return ggx_d(ggx_alpha, sin2_h) * max_of(w.z, T(0)) / ggx_lobe_integral(ggx_alpha);
 }
 
 // ---- visible normals -------------------------------------------------------------------------

@@ -83,10 +83,6 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
   return s;
 }
 
-template <class T> SPLITNERF_HD Vec3<T> lookup_brdf_lut(const float* lut, T n_dot_v, T roughness) {
-  return sample_brdf_lut(lut, n_dot_v, roughness).value;
-}
-
 // ---- the direction at which g is asked -------------------------------------------------------
 //
 // g assumes n = v = w_r. Asking it at the mean direction of the true lobe,
