@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -55,10 +56,7 @@ class Fake(GpuStep):
         self.calls.append(capacity)
         self.model.zero_grad(set_to_none=True)
         looked_up = light(*LOOKUP).sum() + (light.cells.radiance * light.cells.solid_angles[:, None]).mean()
-        value = (
-            batch.target.sum() * found.directions.mean() * self.model.variance
-            + batch.target.mean() * found.number.sum() * looked_up
-        )
+        value = batch.target.sum() * found.directions.mean() * self.model.variance + batch.target.mean() * found.number.sum() * looked_up
         value.backward()
         return value.detach(), {"value": value.detach()}
 
@@ -67,15 +65,7 @@ class Fake(GpuStep):
         self.last = StepNumbers(1, 5, {}, {}, 0.0, Capacity(self.n_found, *counts), 20.0, 0.0)
         return self.capacity.holds(self.last.counts)
 
-    def taken(
-        self,
-        n_rays: int = 5,
-        step: int = 0,
-        progress: float = 0.0,
-        counts: tuple | None = COUNTS,
-        light=None,
-        target=1.0,
-    ):
+    def taken(self, n_rays: int = 5, step: int = 0, progress: float = 0.0, counts: tuple | None = COUNTS, light=None, target=1.0):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
@@ -142,9 +132,7 @@ def decide(step: Fake, what: str) -> dict:
         step.mesh.made_at = 0.25
     elif what == "occlusion":
         step.model.occlusion.ready = True
-    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
-        what, {}
-    )
+    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(what, {})
 
 
 @pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "light", "priors", "rays"])
@@ -157,9 +145,7 @@ def test_another_decision_is_another_graph(step, what):
 def test_steps_that_decide_alike_share_a_graph(step):
     """The light moves with the 4th, the 8th and the last step, for which it stands for 4, 4 and one steps."""
     ways(step, 3)
-    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == [
-        "repeated"
-    ] * 3
+    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == ["repeated"] * 3
     assert [step.taken(step=3).how for _ in range(2)] == ["called", "recorded"]
     assert step.taken(step=7).how == step.taken(step=95).how == "repeated"
     assert step.taken(step=99).how == "repeated" and step.taken(step=98).how == "repeated"
@@ -278,12 +264,8 @@ def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
     assert ways(step, 1) == ["repeated"] and torch.equal(copy, grid.table.detach().half())
 
 
-@pytest.mark.parametrize(("n", "rounded"), [(0, 0), (1, 256), (256, 256), (256.9, 256), (257, 512), (1150, 1280)])
-def test_capacities_come_in_units(n, rounded):
-    assert in_units(n) == rounded
-
-
-def test_a_capacity_holds_all_or_not():
+def test_a_capacity_comes_in_units_and_holds_all_or_not():
+    assert [in_units(n) for n in (0, 1, 256, 256.9, 257, 1150)] == [0, 256, 256, 256, 512, 1280]
     capacity = Capacity(5, 10, 20)
     assert capacity.holds(Capacity(5, 10, 20)) and capacity.holds(Capacity(0, 0, 0)) and Capacity().holds(Capacity(1e9, 1e9, 1e9))
     assert not any(capacity.holds(more) for more in (Capacity(6, 10, 20), Capacity(5, 11, 20), Capacity(5, 10, 21)))
@@ -294,101 +276,57 @@ def test_a_capacity_holds_all_or_not():
 # ---- the recording itself ----
 
 
-class Work:
-    """A CUDA graph that notes what is asked of it."""
-
-    ends_badly = False
-
-    def __init__(self):
-        self.asked = []
-        Work.last = self
-
-    def register_generator_state(self, generator):
-        self.asked.append(("generator", generator))
-
-    def capture_begin(self, **settings):
-        self.asked.append(("begin", settings))
-
-    def capture_end(self):
-        self.asked.append("end")
-        if self.ends_badly:
-            raise RuntimeError("the recording is void")
-
-
-@pytest.fixture
-def work(monkeypatch):
-    monkeypatch.setattr(torch.cuda, "CUDAGraph", Work)
-    monkeypatch.setattr(Work, "ends_badly", False)
-    was_on = gc.isenabled()
-    yield Work
-    (gc.enable if was_on else gc.disable)()
-
-
 @pytest.mark.parametrize("collects", [True, False])
-def test_nothing_is_collected_while_recording(work, collects):
-    (gc.enable if collects else gc.disable)()
-    seen = []
-    graph, result = gpu_step.record(
-        lambda: seen.append((gc.isenabled(), list(work.last.asked))) or "result", "pool", "generator"
-    )
-    begun = [("generator", "generator"), ("begin", {"pool": "pool", "capture_error_mode": "thread_local"})]
-    assert result == "result" and graph is work.last and seen == [(False, begun)]
-    assert graph.asked == [*begun, "end"] and gc.isenabled() == collects
-
-
-def test_a_recording_that_does_not_begin_leaves_the_collection_on(work, monkeypatch):
-    def refused(self, **settings):
-        raise RuntimeError("no recording now")
-
-    monkeypatch.setattr(work, "capture_begin", refused)
-    gc.enable()
-    with pytest.raises(RuntimeError, match="no recording now"):
-        gpu_step.record(lambda: None, None, None)
-    assert gc.isenabled()
-
-
-@pytest.mark.parametrize("ends_badly", [True, False])
-def test_the_first_error_of_a_recording_is_told_and_the_recording_ends(work, monkeypatch, ends_badly):
-    monkeypatch.setattr(work, "ends_badly", ends_badly)
-    gc.enable()
-
-    def fails():
-        raise ZeroDivisionError("first")
-
-    with pytest.raises(ZeroDivisionError, match="first"):
-        gpu_step.record(fails, None, None)
-    assert work.last.asked[-1] == "end" and work.last.asked.count("end") == 1 and gc.isenabled()
-
-
-def test_work_waits_for_what_came_before_and_what_comes_after_for_it(step, monkeypatch):
+@pytest.mark.parametrize("fails", [(), ("begin",), ("work",), ("work", "end")])
+def test_nothing_is_collected_while_recording_and_its_first_error_is_told(monkeypatch, fails, collects):
+    """A recording that has begun ends, once."""
     events = []
 
-    class Stream:
-        def __init__(self, name):
-            self.name = name
+    def happens(name, *details):
+        events.append((name, *details, gc.isenabled()))
+        if name in fails:
+            raise RuntimeError(name)
+        return "result"
 
-        def wait_stream(self, other):
-            events.append(f"{self.name} waits for {other.name}")
+    class Graph:
+        register_generator_state = staticmethod(lambda generator: events.append(generator))
+        capture_begin = staticmethod(lambda **settings: happens("begin", settings))
+        capture_end = staticmethod(lambda: happens("end"))
 
-    class Within:
-        def __init__(self, stream):
-            self.name = stream.name
+    monkeypatch.setattr(torch.cuda, "CUDAGraph", Graph)
+    was_on = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        with pytest.raises(RuntimeError, match=fails[0]) if fails else nullcontext():
+            graph, result = gpu_step.record(lambda: happens("work"), "pool", "generator")
+            assert isinstance(graph, Graph) and result == "result"
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if was_on else gc.disable)()
+    begun = "generator", ("begin", {"pool": "pool", "capture_error_mode": "thread_local"}, False)
+    assert events == [*begun, *([] if "begin" in fails else [("work", False)]), ("end", False)]
 
-        def __enter__(self):
-            events.append(f"in {self.name}")
 
-        def __exit__(self, *_):
-            events.append(f"out of {self.name}")
+@pytest.mark.parametrize("fails", [False, True])
+def test_work_waits_for_what_came_before_and_what_comes_after_for_it(step, monkeypatch, fails):
+    events = []
 
-    step._stream = Stream("ours")
-    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Stream("theirs"))
-    monkeypatch.setattr(torch.cuda, "stream", Within)
-    expected = ["ours waits for theirs", "in ours", "work", "out of ours", "theirs waits for ours"]
-    with step.running():
+    def stream(name):
+        return SimpleNamespace(name=name, wait_stream=lambda other: events.append(f"{name} waits for {other.name}"))
+
+    @contextmanager
+    def within(stream):
+        events.append(f"in {stream.name}")
+        try:
+            yield
+        finally:
+            events.append(f"out of {stream.name}")
+
+    step._stream = stream("ours")
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: stream("theirs"))
+    monkeypatch.setattr(torch.cuda, "stream", within)
+    with pytest.raises(ValueError) if fails else nullcontext(), step.running():
         events.append("work")
-    assert events == expected
-    events.clear()
-    with pytest.raises(ValueError), step.running():
-        events.append("work")
-        raise ValueError
-    assert events == expected
+        if fails:
+            raise ValueError
+    assert events == ["ours waits for theirs", "in ours", "work", "out of ours", "theirs waits for ours"]
