@@ -33,7 +33,7 @@ TESTS = {
     "render/model.py": "test_views.py test_correction.py test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",
     "render/path_traced.py": "test_path_traced.py",
     "render/rays.py": "test_pixel_rays.py",
-    "training/checkpoint.py": "test_checkpoint.py test_hostile_checkpoints.py",
+    "training/checkpoint.py": "test_checkpoint.py",
     "training/finite.py": "test_finite.py",
     "training/gpu_step.py": "test_graph_rules.py test_graphs.py test_finite.py",
     "training/batches.py": "test_batches.py",
