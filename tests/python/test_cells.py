@@ -9,15 +9,10 @@ import torch
 import trimesh
 from mesh_shapes import OFFSET, corners, grid_mesh, scene_of
 from op_checks import generator, unit
-from test_correction import with_mesh
-from test_views import ball
-from test_visibility import Field
 
-from splitnerf.fields import EvaluatedLight, LightPyramid, OcclusionQuery, VisibilityBits
+from splitnerf.fields import EvaluatedLight, Light, LightPyramid, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light_pyramid import octahedral_texels
-from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import cached_visibility
-from splitnerf.render.renderer import find_samples, render_rays
 
 
 def pyramid(seed: int) -> LightPyramid:
@@ -127,23 +122,18 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
     assert max(apart[True]) < 0.01 and max(apart[False]) > 0.03
 
 
-def test_light_and_rays_of_a_cell_have_one_direction():
-    """Aims wait for the next mesh: until then the light stays where the old rays went."""
-    model = with_mesh(trimesh.creation.icosphere(2, 0.5))
-    bits, lit = model.occlusion, EvaluatedLight(lamp(unit(torch.tensor([[0.3, 0.2, 0.8]]))[0]).evaluate())
-    before = bits.directions.clone()
-    bits.aim(lit)
-    assert torch.equal(bits.cell_light(lit.maps).directions, before) and torch.equal(bits.cache.directions, before)
-    mesh = trimesh.creation.icosphere(2, 0.5)
-    traced = bits.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces))
-    assert torch.equal(bits.directions, before)
-    bits.use(traced)
-    assert not torch.equal(bits.directions, before)
-    assert torch.equal(bits.cell_light(lit.maps).directions, bits.cache.directions)
-    assert ((bits.directions @ bits.centres.T).argmax(1) == torch.arange(256)).float().mean() > 0.98
-
-
 # ---- what the mesh reflects into them ----
+
+
+class Field(Light):
+    """A light that does not depend on the roughness."""
+
+    def __init__(self, radiance):
+        super().__init__()
+        self.radiance = radiance
+
+    def forward(self, directions, roughness):
+        return self.radiance(directions)
 
 
 def floor_and_wall() -> trimesh.Trimesh:
@@ -174,68 +164,4 @@ def test_a_mirror_sends_what_stands_in_the_mirror_direction():
     torch.testing.assert_close(sent[0, to_wall], sky.radiance(mirrored)[to_wall], rtol=0, atol=1e-4)
 
 
-def test_each_refresh_adds_a_mirror():
-    """Between two facing mirrors that reflect half under a sky of 1: what is sent nears 1/2 + 1/4 + ... where the ways out
-    are open, and is never more."""
-    left, right = grid_mesh(2.0, 30), grid_mesh(2.0, 30, 0.5)
-    right.invert()
-    mesh = trimesh.util.concatenate([left, right])
-    bits = VisibilityBits(256, 1e-3, 3, True)
-    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], torch.tensor(mesh.faces)))
-    lit = EvaluatedLight(Field(torch.ones_like))
-    bits.set_light(lit)
-    levels = []
-    for _ in range(4):
-        bits.refresh(
-            lit, lambda x: (x, 0 * x[:, :1] + 0.05, x[:, :1]), lambda n, views, here, light_s, light_d: 0.5 * light_s
-        )
-        levels.append(bits.radiance.clone())
-    assert bits.radiance.max() <= 0.5 + 1e-6
-    open_ = bits.emitters.mirrored < 0
-    assert 0.05 < open_.float().mean() < 0.9
-    torch.testing.assert_close(bits.radiance[open_], torch.full_like(bits.radiance[open_], 0.5))
-    once = (bits.emitters.mirrored >= 0) & open_[bits.emitters.mirrored.clamp(min=0)]
-    assert (levels[0][once] == 0).all()
-    torch.testing.assert_close(levels[1][once], torch.full_like(levels[1][once], 0.25))
-    assert torch.equal(levels[3][once], levels[1][once])
-
-
 # ---- what is added to a pixel ----
-
-
-def test_a_correction_counts_by_the_weight_of_its_surface(monkeypatch):
-    """Two balls behind one another, the first of which covers part of a pixel: the heavier one is corrected, by its share."""
-    model, cells = ball()
-    model.config = model.config.replace({"shading.method": "summed"})
-    model.occlusion.ready = model.occlusion.is_unoccluded = True
-    centres, radii = torch.tensor([[0.5, 0, 0], [-0.7, 0, 0]]), torch.tensor([0.3, 0.6])
-
-    def surface(x: torch.Tensor) -> SdfSample:
-        away = x[:, None] - centres
-        distance, nearest = (away.norm(dim=2) - radii).min(1)
-        outputs = torch.cat([distance[:, None], torch.zeros(len(x), 12)], 1)
-        features = torch.zeros(len(x), model.sdf_field.grid.spec.n_outputs)
-        return SdfSample(outputs, features, unit(away[torch.arange(len(x)), nearest]))
-
-    monkeypatch.setattr(model, "surface", surface)
-    middles = (torch.arange(len(cells)) + 0.5) / len(cells) * 3 - 1.5
-    between = (middles > -0.05) & (middles < 0.15)
-    cells = torch.ones_like(cells) * (~between)[:, None, None]
-    heights = torch.tensor([0.26, 0.29, 0.3, 0.31, 0.33])
-    rays = torch.stack([torch.tensor([4.0, y, 0]) for y in heights]), torch.tensor([[-1.0, 0, 0]] * 5), torch.full((5,), 0.5)
-    model.config = model.config.replace({"sampling.min_weight": 0.0})
-    found = find_samples(model, cells, *rays)
-    added = {False: 0.0, True: 1.0}
-    means = []
-    for corrected in (False, True):
-        monkeypatch.setattr(
-            model, "quadrature_correction",
-            lambda light, views, points, candidates, *_: (candidates, added[corrected] * torch.ones(len(candidates), 3)),
-        )  # fmt: skip
-        ray = render_rays(model, model.evaluate_light(), found)
-        means.append(ray.mean)
-    x = found.positions[: len(ray.weights), 0]
-    in_front = torch.zeros(5).index_add(0, ray.samples.ray_indices, ray.weights * (x > 0.05)) / ray.opacity
-    assert ((in_front > 0.1) & (in_front < 0.9)).sum() >= 2
-    share = torch.maximum(in_front, 1 - in_front)
-    torch.testing.assert_close((means[1] - means[0])[:, 0], share, rtol=0, atol=0.02)

@@ -7,11 +7,9 @@ import torch
 import trimesh
 from mesh_shapes import scene_of
 from op_checks import generator, unit
-from test_shading_model import K, Given, TwoLights, points_of, shade
 from test_views import ball
 from tiny_runs import tiny
 
-from splitnerf.ops import split_sum_shade
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
@@ -152,21 +150,6 @@ def test_rays_are_weighed_by_the_cosine_they_are_told():
     assert (weights[0] - weights[1]).abs().max() > 0.01
 
 
-@pytest.mark.parametrize("variance", [0.2, 0.4])
-def test_samples_that_are_left_out_weigh_next_to_nothing(variance):
-    """Broad densities reach far: what is found covers a ray as all samples of it do."""
-    opacities = []
-    for sample_above in (0.0, 1e-3):
-        model, _ = ball(**{"sampling.min_weight": sample_above})
-        with torch.no_grad():
-            model.variance.fill_(variance)
-        grid = make_grid(model.config)
-        grid.update(model.sdf_field.sdf, model.s_value)
-        rays = torch.tensor([[4.0, y, 0] for y in (0.0, 0.5, 0.7)]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
-        opacities.append(render_rays(model, model.evaluate_light(), find_samples(model, grid.cells, *rays)).opacity)
-    torch.testing.assert_close(opacities[0], opacities[1], rtol=0, atol=0.02)
-
-
 def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     model, cells = ball(shades_per_ray=1, smoothness_points=40, eikonal_points=30, entropy_points=20)
     grid = make_grid(model.config)
@@ -198,21 +181,6 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
 # ---- settings ----
 
 
-@pytest.mark.parametrize("compensate", [True, False])
-def test_scattered_light_is_compensated_where_that_is_set(compensate):
-    light, materials = TwoLights(2.0, 3.0), points_of(1.0, roughness=0.9)
-    found = shade(light, materials, compensate=compensate).radiance
-    g = generator(4)
-    normals = unit(torch.randn(K, 3, generator=g))
-    views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
-    white, one = torch.ones(K, 3), torch.ones(K, 1)
-    expected = {
-        x: split_sum_shade(normals, views, *materials, 3 * white, 2 * white, one, one, "exact", x) for x in (True, False)
-    }  # fmt: skip
-    torch.testing.assert_close(found, expected[compensate])
-    assert (expected[True] - expected[False]).abs().max() > 0.1
-
-
 @pytest.mark.parametrize("name", ["analytic", "finite_difference"])
 def test_normals_are_taken_as_set(name):
     torch.manual_seed(0)
@@ -228,14 +196,3 @@ def test_normals_are_taken_as_set(name):
 def test_the_bits_are_made_as_they_are_set():
     bits = SceneModel(tiny(occlusion_offset=0.03, open_below=0.4, indirect=False, occlusion_directions=288)).occlusion
     assert (bits.offset, bits.open_below, bits.indirect, len(bits.directions)) == (0.03, 0.4, False, 288)
-
-
-def test_without_a_mesh_and_where_nothing_is_blocked_factors_have_their_channels():
-    for channels in (1, 3):
-        model = SceneModel(tiny(occlusion_channels=channels, **{"shading.method": "split"}))
-        model.light, model.material = TwoLights(1.0, 1.0), Given(points_of(0.0))
-        g = generator(4)
-        normals = unit(torch.randn(K, 3, generator=g))
-        features = torch.zeros(K, model.sdf_field.grid.spec.n_outputs)
-        shaded = model.shade(model.evaluate_light(), torch.zeros(K, 3), torch.zeros(K, 13), features, normals, normals)
-        assert shaded.occlusion_d.shape == shaded.occlusion_s.shape == (K, channels)

@@ -10,13 +10,11 @@ import pytest
 
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
+from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.relit import map_files, read_relit, relight_maps
-from splitnerf.data.truth import ViewTruth
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol, choose_views
 from splitnerf.evaluate.relight import RelitViews, relight_scores, straight_srgb
-from splitnerf.evaluate.sheet import ERROR_GAIN, LABEL_HEIGHT, LABEL_WIDTH, write_sheet
 from splitnerf.evaluate.similarity import ScaledView, scaled_scores
 from splitnerf.evaluate.table import evaluation_table
 
@@ -148,20 +146,6 @@ def test_relit_images_are_scored_with_one_scale_and_per_map(views):
     assert relit["maps"]["my_sun"]["psnr"] > relit["psnr"] > relit["maps"]["city"]["psnr"]
 
 
-def test_an_image_that_is_darker_by_a_factor_in_linear_light_is_as_good(views):
-    """The scale is one of radiance: predictions of half the truth's radiance, in 8-bit sRGB, leave no error but their
-    rounding. As numbers of sRGB the two are no factor apart."""
-    level = np.linspace(0.1, 0.95, SIZE * SIZE).reshape(SIZE, SIZE, 1)  # sRGB
-    half = linear_to_srgb(srgb_to_linear(level) / 2)
-    opaque = np.ones((SIZE, SIZE, 1))
-    for path in views.image_paths:
-        write_image(path.with_name(f"{path.stem}_relit_city.png"), np.concatenate([level] * 3 + [opaque], -1))
-    prediction = np.rint(255 * np.concatenate([half] * 3 + [opaque], -1)).astype(np.uint8)
-    relit = relight_scores(RelitViews({"city": [prediction] * 5}, views, 8))
-    assert relit["lsq"]["scale"] == pytest.approx([2, 2, 2], rel=3e-3)
-    assert relit["psnr"] > 50 and relit["raw"]["psnr"] < 20
-
-
 def test_renderings_become_straight_srgb():
     alpha = np.array([[0.5, 1.0, 0.0]], np.float32)
     radiance = np.repeat(np.array([[0.25, 3.0, 0.0]], np.float32)[..., None], 3, axis=-1)
@@ -188,19 +172,6 @@ def test_table():
     assert (mean["novel view PSNR"], mean["normals, degrees"]) == ("32.00", "5.00")
     assert (mean["relight PSNR"], mean["novel view LPIPS"], mean["albedo PSNR"]) == ("27.13 (1)", "0.050 (1)", "-")
     assert "mean" not in evaluation_table([("chair", FULL)])
-
-
-def test_sheet_shows_truth_prediction_and_error(views, tmp_path):
-    data = replace(views.select([0, 1]), images=np.full((2, 200, 200, 4), [0.25, 0.5, 1, 1], np.float32))
-    alpha = np.ones((200, 200), np.float32)
-    predictions = [{"rgb": np.full((200, 200, 3), [0.25, 0.6, 1], np.float32), "alpha": alpha}] * 2
-    write_sheet(tmp_path / "s.png", data, predictions, [ViewTruth("a")] * 2, {}, None)
-    sheet = read_image(tmp_path / "s.png")
-    assert sheet.shape == (LABEL_HEIGHT + 200, LABEL_WIDTH + 6 * 200, 3)
-    panels = [sheet[LABEL_HEIGHT + 100, LABEL_WIDTH + 100 + 200 * i] for i in range(3)]
-    assert panels[0] == pytest.approx([0.25, 0.5, 1], abs=0.003)
-    assert panels[1] == pytest.approx([0.25, 0.6, 1], abs=0.003)
-    assert panels[2] == pytest.approx([0, 0.1 * ERROR_GAIN, 0], abs=0.003)
 
 
 def test_tables_are_made_from_scores_written_before(tmp_path, capsys):

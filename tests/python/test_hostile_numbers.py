@@ -1,4 +1,4 @@
-"""Numbers that would end the process: the tracer's and a sparse matrix's. They are refused, or meet nothing."""
+"""Numbers that would end the process: those of the tracer. They are refused, or meet nothing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gltf_builder import triangle
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
 from splitnerf.fields.visibility import bit_counts
-from splitnerf.ops import MeshScene, SparseMap, march_rays, occlusion_factors, sparse_product
+from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.ops._library import lib
 
 BAD = [math.nan, math.inf, -math.inf, 1e19, 3e38]
@@ -86,39 +86,6 @@ def test_bits_of_points_that_are_none(ball, value):
     others = torch.arange(20) != 4
     assert torch.equal(good[others], found[others]) and torch.equal(hits[others], their_hits[others])
     assert bit_counts(found[4:5, 1]) == 0 and (their_hits[4] < 0).all() and bit_counts(good[4:5, 1]) > 0
-
-
-MATRIX = SparseMap(
-    torch.tensor([0, 1, 3]), torch.tensor([0, 1, 2], dtype=torch.int32), torch.ones(3),
-    torch.tensor([0, 1, 2, 3]), torch.tensor([0, 1, 1], dtype=torch.int32), torch.ones(3),
-)  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "message"), [
-    ({"columns": torch.tensor([0, 1, 3], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
-    ({"columns": torch.tensor([0, -1, 2], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
-    ({"columns": torch.tensor([0, 1 << 30, 2], dtype=torch.int32)}, r"columns must hold numbers in \[0, 3\)"),
-    ({"offsets": torch.tensor([0, 1, 4])}, r"offsets must ascend within \[0, 3\]"),
-    ({"offsets": torch.tensor([-1, 1, 3])}, r"offsets must ascend within \[0, 3\]"),
-    ({"offsets": torch.tensor([0, 4, 3])}, r"offsets must ascend within \[0, 3\]"),
-    ({"offsets": torch.tensor([0, -5, 3])}, r"offsets must ascend within \[0, 3\]"),
-])  # fmt: skip
-def test_a_sparse_matrix_names_what_there_is(change, message):
-    values = torch.rand(3, 3)
-    assert sparse_product(MATRIX, values).shape == (2, 3)
-    with pytest.raises(ValueError, match=message):
-        sparse_product(MATRIX._replace(**change), values)
-    if "columns" in change:  # the transpose is read in the backward pass
-        turned = MATRIX._replace(transposed_columns=change["columns"])
-        with pytest.raises(ValueError, match=r"columns must hold numbers in \[0, 2\)"):
-            sparse_product(turned, values.requires_grad_()).sum().backward()
-
-
-def test_a_march_has_an_end():
-    """A box of 2^40 units took longer than anyone waits."""
-    rays = torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0]]), torch.zeros(1), torch.ones(4, 4, 4, dtype=torch.uint8)
-    with pytest.raises(ValueError, match="march_rays: box must be at most 2.20 steps"):
-        march_rays(*rays, float(1 << 40), 0.1)
 
 
 def test_a_cache_without_vertices_is_refused():

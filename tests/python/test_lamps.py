@@ -120,35 +120,31 @@ def test_a_sun_whose_glow_is_too_dim_gets_its_share(ball_over_plate):
     assert sun_to_sky(new) == pytest.approx(POWER.mean() / 0.3, rel=0.12)
 
 
-def test_what_is_too_dark_says_nothing(ball_over_plate):
-    light = glowing_sky(12.0)
-    assert found(ball_over_plate, 0.04 * shaded_albedo(ball_over_plate, 0.3, light), light) == (light, None)
+ASIDE = unit(np.cross(SUN, [0.0, 0.0, 1.0]))
+NO_LAMP = {  # a light, the radius of the lamp whose shadow the albedo shows, and what else is done to the albedo
+    "too dark": (SUN, 0.3, 0.04),
+    "a broad lamp": (SUN, 20.0, 1.0),
+    "no shadow": (SUN, None, 1.0),
+    # 13 degrees beside the glow: the nearest that is tried explains the shadow in part, and is not it
+    "a lamp at the rim of those tried": (unit(SUN + np.tan(np.radians(13.0)) * ASIDE), 0.3, 1.0),
+}
 
 
-def test_a_broad_lamp_stays_as_it_is(ball_over_plate):
-    light = glowing_sky(12.0)
-    for albedo in (shaded_albedo(ball_over_plate, 20.0, light), np.full((SIZE, SIZE, 3), 0.4, np.float32)):
-        new, lamp = found(ball_over_plate, albedo, light)
-        assert lamp is None and new is light
+@pytest.mark.parametrize("case", NO_LAMP)
+def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate, case):
+    direction, radius, factor = NO_LAMP[case]
+    light, grey = glowing_sky(12.0, direction), np.full((SIZE, SIZE, 3), 0.4, np.float32)
+    albedo = grey if radius is None else factor * shaded_albedo(ball_over_plate, radius, light)
+    new, lamp = found(ball_over_plate, albedo, light)
+    assert lamp is None and new is light
 
 
-def test_a_lamp_at_the_rim_of_those_tried_is_none(ball_over_plate):
-    """The sun is 13 degrees beside the glow: the nearest that is tried explains the shadow in part, and is not it."""
-    aside = unit(np.cross(SUN, [0.0, 0.0, 1.0]))
-    light = glowing_sky(12.0, unit(SUN + np.tan(np.radians(13.0)) * aside))
-    assert found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, light), light) == (light, None)
-
-
-def test_a_light_without_a_lamp_stays_as_it_is(ball_over_plate):
-    light = np.full((16, 32, 3), 0.7, np.float32)
-    assert compact_lamp(AssetTexels(ball_over_plate), light, 3, 0) == (light, None)
-
-
-def test_metal_says_nothing(ball_over_plate):
-    light = glowing_sky(12.0)
+def test_metal_and_a_light_without_a_lamp_say_nothing(ball_over_plate):
+    light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
     metal = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light),
                           roughness_metallic_texture=np.ones((SIZE, SIZE, 2), np.float32))  # fmt: skip
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
+    assert compact_lamp(AssetTexels(ball_over_plate), flat, 3, 0) == (flat, None)
 
 
 def test_refinement_begins_with_the_compact_lamp(ball_over_plate):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from test_physics import entropy, rays
+from test_physics import rays
 from tiny_runs import tiny
 
 from splitnerf.fields.light import LightSamples
@@ -98,15 +98,13 @@ def test_the_gradient_of_the_light_loss_goes_to_both_sides(below):
     assert levels.grad.tolist() == pytest.approx([-3.0, 3.0], rel=1e-3)
 
 
-@pytest.mark.parametrize(("form", "expected"), [("square", 3 * 0.25), ("smooth_l1", 3 * 0.125)])
-def test_the_error_of_the_light_has_its_form(form, expected):
-    """Off by a half in each channel."""
-
-    def light(directions, roughness):
-        return 1.0 + 0.5 * (roughness > 0).float().expand(-1, 3)
-
-    config = tiny(light_queries=64, **LOOSE | {"constants.light_form": form})
-    assert losses.light_loss(light, config, generator(), 0).item() == pytest.approx(expected, rel=1e-3)
+@pytest.mark.parametrize(("form", "expected"), [("square", 0.01 + 0.04 + 4.0), ("smooth_l1", 0.005 + 0.02 + 1.5)])
+def test_the_light_loss_is_the_mean_over_queries_of_the_sum_over_channels(form, expected):
+    """Eq. (11): the mean over s of |g(s) - gbar(s)|^2, a vector's length: off by 0.1, -0.2 and 2."""
+    for n_queries in (16, 64):
+        config = tiny(light_queries=n_queries, **LOOSE | {"constants.light_form": form})
+        loss = losses.light_loss(lambda _, rho: 1 + (rho > 0) * torch.tensor([0.1, -0.2, 2.0]), config, generator(), 0)
+        assert loss.item() == pytest.approx(expected, rel=1e-4)
 
 
 def test_the_number_of_directions_is_learned_from_broad_lobes_alone():
@@ -126,13 +124,6 @@ def test_the_number_of_directions_is_learned_from_broad_lobes_alone():
     assert broad < 32 and n == 128 and error == pytest.approx(3.0 * broad, rel=1e-3) and noise < 1e-6
 
 
-def test_neutral_light_is_asked_about_diffuse_light():
-    def light(directions, roughness):
-        return torch.where(roughness == 1, torch.ones(3), torch.tensor([4.0, 1.0, 0.25]))
-
-    assert losses.neutral_light_loss(light, tiny(), generator()).item() == pytest.approx(0.0, abs=1e-9)
-
-
 # ---- sums, and what is drawn ----
 
 
@@ -147,19 +138,10 @@ def test_the_gradient_is_that_of_the_weighted_sum():
     assert {name: (weight, value.item()) for name, (weight, value) in terms.items()} == {"a": (2, 9), "b": (5, 3), "c": (-3, 1)}
 
 
-def test_materials_differ_in_being_metal_as_well(monkeypatch):
-    """ln 2 for halves that are and are not; drawn by the run's own generator; what is not finite does not stop the draw."""
-    config = tiny(entropy_points=2000)
-    ray = rays([1.0, 1.0], [0.0, 1.0])
+def test_shares_that_are_not_finite_do_not_stop_the_draw_of_materials():
+    ray = rays([1.0, float("nan")], [0.0, 1.0])
     ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
-    found = []
-    for seed in range(2):
-        torch.manual_seed(seed)
-        found.append(losses.material_entropy_loss(ray, config, generator()).item())
-    assert found[0] == found[1] == pytest.approx(0.693, abs=0.01)
-    ray.shares = torch.tensor([1.0, float("nan")])
-    assert losses.material_entropy_loss(ray, config, generator()).item() == pytest.approx(0.0, abs=1e-6)
-    assert entropy([0.02, 0.9], weights=[1.0, 0.0]) == pytest.approx(0.0, abs=1e-6)
+    assert losses.material_entropy_loss(ray, tiny(), generator()).item() == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -253,18 +235,6 @@ def test_the_light_is_asked_by_the_runs_own_generator(light_set):
         torch.testing.assert_close(directions.norm(dim=1), torch.ones(len(directions)))
         assert directions.mean(0).norm() < 0.2
     assert len(normals) == 256 and (asked[1][1] == 1).all()
-
-
-def test_narrow_lobes_sample_themselves_and_broad_ones_share(monkeypatch):
-    """Each query is one or the other, by its own roughness."""
-    narrow, broad = [], []
-    sample, prefilter = losses.sample_ggx_lobe, losses.prefilter_light
-    monkeypatch.setattr(losses, "sample_ggx_lobe", lambda *args: narrow.append(args) or sample(*args))
-    monkeypatch.setattr(losses, "prefilter_light", lambda *args: broad.append(args) or prefilter(*args))
-    losses.light_loss(Slope(), tiny(light_queries=64, **LOOSE | {"light_lobe_below": 0.6}), generator(), 0)
-    (axes, roughness, n, _), (others, rest, *_) = narrow[0], broad[0]
-    assert 5 < len(axes) < 32 and (roughness < 0.6).all() and n == 16
-    assert len(axes) + len(others) == 64 and (rest >= 0.6).all() and (rest < 1).sum() > 2
 
 
 # ---- where the slopes go ----

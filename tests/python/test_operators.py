@@ -354,6 +354,12 @@ ERRORS = [
     ("sdf_field", 13, lambda n: 4, "n_active must be in [0, n_levels], got 4"),
     ("march_rays", 4, lambda box: -1.0, "box"),
     ("march_rays", 5, lambda step: 0.0, "step"),
+    ("march_rays", 4, lambda box: float(1 << 40), "box must be at most 2^20 steps"),  # which would take for ever
+    ("sparse_product", 0, lambda offsets: offsets - 1, "offsets must ascend within [0, "),
+    ("sparse_product", 0, lambda offsets: offsets + 1, "offsets must ascend within [0, "),
+    ("sparse_product", 0, lambda offsets: offsets.flip(0), "offsets must ascend within [0, "),
+    ("sparse_product", 1, lambda columns: columns + 1, "columns must hold numbers in [0, 64)"),
+    ("sparse_product", 1, lambda columns: columns - 1, "columns must hold numbers in [0, 64)"),
     ("surface_weights", 4, lambda offsets: offsets + 1, "offsets must rise from 0"),
     ("surface_weights", 4, lambda offsets: offsets[:0], "offsets must be"),
     ("surface_weights", 4, lambda offsets: offsets.flip(0), "offsets must rise from 0"),

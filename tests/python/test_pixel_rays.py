@@ -12,7 +12,7 @@ from op_checks import generator
 from precision import precisions
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.render.rays import PixelSource, image_rays, pixel_rays
+from splitnerf.render.rays import PixelSource, image_rays
 
 HEIGHT, WIDTH = 20, 32
 LENSES = np.array(
@@ -87,13 +87,6 @@ def test_rays_of_an_image_go_through_its_middles_row_by_row():
         at = project(far_along(*rays), pose, lens).reshape(HEIGHT, WIDTH, 2)
         row, column = np.mgrid[:HEIGHT, :WIDTH]
         np.testing.assert_allclose(at, np.stack([column, row], -1) + 0.5, atol=1e-3)
-
-
-def test_the_ray_of_the_principal_point_is_the_view_axis():
-    for pose, lens in zip(POSES, LENSES):
-        origins, directions = pixel_rays(*map(torch.from_numpy, (pose, lens, lens[2:3], lens[3:4])))
-        np.testing.assert_allclose(directions[0], -pose[:3, 2], atol=1e-6)
-        np.testing.assert_allclose(origins[0], pose[:3, 3])
 
 
 # ---- what is drawn ----

@@ -85,15 +85,6 @@ def test_no_sample_of_weight_is_missed_and_few_points_are_asked(anneal, variance
     assert len(found.directions) < share * len(whole.directions)
 
 
-def test_more_samples_count_while_the_cosine_is_annealed():
-    """A ray that leaves the surface has weight as well then."""
-    model, _ = ball(**{"sampling.min_weight": 1e-3})
-    with torch.no_grad():
-        model.variance.fill_(0.3)
-    early, late = (len(find_samples(model, FULL, *oblique(), anneal).directions) for anneal in (0.0, 1.0))
-    assert early > late
-
-
 @pytest.mark.parametrize("sample_above", [0.0, 1e-3])
 def test_a_ray_ends_where_little_light_is_left(sample_above):
     rays = torch.tensor([[4.0, 0.1, 0]]), torch.tensor([[-1.0, 0, 0]]), torch.tensor([0.5])

@@ -67,12 +67,6 @@ def test_what_is_read_of_a_table_of_16_bits_is_the_same_with_and_without_gradien
     assert field.network().table.dtype == torch.float16
 
 
-def test_the_gradient_is_the_slope_of_the_formula():
-    field, x = field_of(), points().requires_grad_()
-    (expected,) = torch.autograd.grad(formula(field, x)[:, 0].sum(), x)
-    torch.testing.assert_close(field.sample(x.detach()).gradient, expected)
-
-
 def test_a_loss_on_outputs_and_gradient_reaches_every_parameter():
     """By differences of 1e-6 in each parameter's direction of its own gradient."""
     field, x = field_of(), points(20)

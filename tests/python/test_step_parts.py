@@ -26,13 +26,6 @@ def placed(samples: PackedSamples, chosen: list[float], padded: bool) -> tuple[l
     return positions.tolist(), directions, beside.tolist()
 
 
-@pytest.mark.parametrize("padded", [False, True])
-def test_points_are_the_middles_of_samples_then_those_given_then_those_beside(padded):
-    positions, directions, beside = placed(SAMPLES, [0.0, 0.99], padded)
-    assert positions == [*MIDDLES, [5, 5, 5], [1.5, 0, 1], [10, 3.5, 2]]
-    assert directions.tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]] and beside == [0, 2]
-
-
 def test_padding_repeats_the_first_samples_and_none_is_beside_it():
     positions, directions, beside = placed(SAMPLES.extended(4), [0.5, 0.99], True)
     assert positions == [*MIDDLES, *MIDDLES, MIDDLES[0], [5, 5, 5], [2.5, 0, 1], [10, 3.5, 2]]

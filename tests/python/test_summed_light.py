@@ -7,12 +7,12 @@ import math
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, scene_of
+from mesh_shapes import scene_of
 from op_checks import generator, unit
 
 from splitnerf import _core
 from splitnerf.config import Config
-from splitnerf.fields import EvaluatedLight, Light, VisibilityBits
+from splitnerf.fields import Light
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import monte_carlo_light, prefilter_light, light_queries, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
@@ -28,23 +28,6 @@ class Lamp(Light):
     def forward(self, directions, roughness):
         lobe = torch.exp(200.0 * (directions @ self.axis - 1.0))[:, None]
         return (0.2 + self.power * lobe).expand(-1, 3)
-
-
-def test_the_cells_light_keeps_power_and_place():
-    bits, lamp = VisibilityBits(256, OFFSET, 3, True), Lamp((0.3, -0.5, 0.7))
-    bits.aim(EvaluatedLight(lamp))
-    light = bits.cell_light(lamp)
-    exact = 4 * math.pi * 0.2 + 50.0 * 2 * math.pi / 200.0
-    power = light.radiance[:, :1] * light.solid_angles[:, None]
-    assert power.sum().item() == pytest.approx(exact, rel=0.04)  # the lamp is as wide as two texels
-    power = power - 0.2 * light.solid_angles[:, None]
-
-    def off(w: torch.Tensor) -> float:
-        return math.degrees(math.acos((unit((power * w).sum(0, keepdim=True)) @ lamp.axis).item()))
-
-    assert off(bits.aims) < 0.7 < 1.0 < off(bits.centres)
-    light.radiance.sum().backward()
-    assert lamp.power.grad.item() > 0
 
 
 def brute_force(lamp, normals, views, albedo, roughness, metallic) -> torch.Tensor:
