@@ -21,7 +21,6 @@ from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.step import Capacity
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
-from splitnerf.errors import InputError
 from splitnerf.fields import visibility
 from splitnerf.ops import CELL_OCCUPIED
 from splitnerf.render import model, occupancy, renderer
@@ -46,16 +45,6 @@ def test_two_devices_in_one_call_are_told(monkeypatch):
             there.numpy()
         assert (there + torch.tensor(1.0)).sum().item() == 6 and there[there > 0].shape == (3,)
         assert gpu.waits == {"cpu": 1, "to": 1, "item": 1, "__getitem__": 1}
-
-
-def test_modules_and_gradients_stay_there(monkeypatch):
-    with pretend_gpu(monkeypatch):
-        layer = torch.nn.Linear(3, 2).to("cuda")
-        assert all(isinstance(p, GpuTensor) and p.requires_grad for p in layer.parameters())
-        layer(torch.ones(4, 3, device="cuda")).sum().backward()
-        optimiser = torch.optim.AdamW(layer.parameters(), fused=True)
-        optimiser.step()
-        assert layer.weight.grad.device == GPU and optimiser.state[layer.weight]["exp_avg"].device == GPU
 
 
 # In 200 steps with 10 lines of metrics.jsonl, 6 updates of the grid (paper: 13) and one mesh. Parameters are checked before the
@@ -214,15 +203,6 @@ def test_all_files_are_written_from_there(data, tmp_path, monkeypatch):
     assert evaluation["novel_view"]["psnr"] > 5
     for name in ("mesh.ply", "mesh.glb", "environment.exr", "report.html"):
         assert (tmp_path / "run" / name).stat().st_size > 0, name
-
-
-def test_a_gpu_is_refused_where_bits_shall_repeat(data, tmp_path, monkeypatch):
-    config = tiny("cpu", deterministic=True)
-    with pretend_gpu(monkeypatch), pytest.raises(InputError, match="deterministic"):
-        reconstruct(data, tmp_path / "run", config, device="cuda")
-    assert not (tmp_path / "run").exists()
-    with pretend_gpu(monkeypatch), pytest.raises(InputError, match="deterministic"):
-        trainer.train(load_dataset(data), config, tmp_path, device="cuda")
 
 
 def test_without_a_gpu_the_device_is_refused(data, tmp_path, capsys):

@@ -7,7 +7,6 @@ import json
 import re
 import shutil
 import signal
-from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -211,24 +210,8 @@ def n_pixels(painted) -> int:
     return len(covered_pixels(painted[1]))
 
 
-def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch):
-    """Interrupted after every sweep, it ends with the bits of the whole; the time of all parts counts."""
-    whole = refine_folder(folder, painted[1], folder / "whole", QUICK)
-    for n in range(1, 4):
-        with monkeypatch.context() as patch:
-            stop_after(patch, n)
-            assert refine_folder(folder, painted[1], folder / "parts", QUICK, resume=n > 1) is None
-        content = read_tensors(folder / "parts" / "refinement.pt")
-        assert len(content["sweeps"]) == n and not (folder / "parts" / "mesh.glb").exists()
-    seconds = content["seconds"]
-    parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
-    assert parts.sweeps[-1].seconds > seconds > parts.sweeps[0].seconds and parts.outline == whole.outline
-    assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
-    assert bytes_of(folder / "parts", *DELIVERED[:3]) == bytes_of(folder / "whole", *DELIVERED[:3])
-
-
-def within(sweep: int) -> Callable:
-    """Refinement.gather, which sends SIGINT to this process before the second batch of a sweep, counted from 0."""
+def stop_within(monkeypatch, sweep: int) -> None:
+    """Sends SIGINT to this process before the second batch of a sweep, counted from 0; the sweep ends there."""
     gather = Refinement.gather
 
     def interrupted(fit, surface):
@@ -238,18 +221,22 @@ def within(sweep: int) -> Callable:
             raise AssertionError("the sweep goes on")
         return error
 
-    return interrupted
+    monkeypatch.setattr(Refinement, "gather", interrupted)
 
 
-def test_a_signal_ends_a_sweep(painted, folder, monkeypatch):
-    """It may take longer than the second that there is; the stage goes on from the sweep's beginning, with the bits of the whole."""
+@pytest.mark.parametrize(("stop", "sweeps"), [(stop_after, (1, 2, 3)), (stop_within, (0, 2))])
+def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch, stop, sweeps):
+    """Interrupted after every sweep, or within sweeps that begin again, it ends with the bits of the whole; the time of all parts
+    counts."""
     whole = refine_folder(folder, painted[1], folder / "whole", QUICK)
-    for n in (0, 2):
+    for n in sweeps:
         with monkeypatch.context() as patch:
-            patch.setattr(Refinement, "gather", within(n))
-            assert refine_folder(folder, painted[1], folder / "parts", QUICK, resume=n > 0) is None
-        assert len(read_tensors(folder / "parts" / "refinement.pt")["sweeps"]) == n
+            stop(patch, n)
+            assert refine_folder(folder, painted[1], folder / "parts", QUICK, resume=n > sweeps[0]) is None
+        content = read_tensors(folder / "parts" / "refinement.pt")
+        assert len(content["sweeps"]) == n and not (folder / "parts" / "mesh.glb").exists()
     parts = refine_folder(folder, painted[1], folder / "parts", QUICK, resume=True)
+    assert parts.sweeps[-1].seconds > content["seconds"] and parts.outline == whole.outline
     assert [s.error for s in parts.sweeps] == [s.error for s in whole.sweeps]
     assert bytes_of(folder / "parts", *DELIVERED[:3]) == bytes_of(folder / "whole", *DELIVERED[:3])
 

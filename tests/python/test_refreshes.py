@@ -25,6 +25,7 @@ from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.metrics import StepLog
 from splitnerf.training.step import Capacity, StepNumbers
+from splitnerf.pipeline import load_run
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
@@ -197,11 +198,6 @@ def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, mo
     assert {int(moments["step"]) for moments in training.optimiser.state.values()} == {int(complete)}
 
 
-def test_the_first_steps_the_last_and_every_twentieth_are_logged(data, tmp_path):
-    loop.train(load_dataset(data), tiny(steps=41, target_samples=64, **PLAIN), tmp_path)
-    assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 40, 41]
-
-
 def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, monkeypatch):
     """Each step takes 10 seconds: checkpoints after more than a minute; a pause between two parts does not count."""
     at, pause, saved = steps_of(monkeypatch), [0.0], []
@@ -223,20 +219,15 @@ def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, mon
     [(0, 0, 0.0), (30, 6, 0.3), (10, 60, 0.5), (100, 0, 1.0), (0, 120, 1.0), (200, 300, 1.0)],
 )
 def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, seconds, progress):
+    """Training leaves the refinement its share of the minutes."""
     training = loop.Training(load_dataset(data), tiny(steps=100, max_minutes=2.0), tmp_path, torch.device("cpu"))
     training.step, training.seconds = step, float(seconds)
-    assert training.progress == pytest.approx(progress)
-    training.config = tiny(steps=100)
-    assert training.progress == pytest.approx(min(1.0, step / 100))
-
-
-@pytest.mark.parametrize(("refine", "share"), [(True, 0.6), (False, 1.0)])
-def test_training_leaves_the_refinement_its_share_of_the_minutes(data, tmp_path, refine, share):
-    config = tiny(steps=100, max_minutes=2.0, **{"refinement.enabled": refine}, refinement_share=0.4)
-    assert config.training_minutes + config.refinement_minutes == 2.0
-    training = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu"))
-    training.seconds = 60.0
-    assert training.progress == pytest.approx(0.5 / share)
+    assert training.progress == pytest.approx(progress) and training.finished == (progress == 1.0)
+    refined = tiny(steps=100, max_minutes=2.0, **{"refinement.enabled": True}, refinement_share=0.4)
+    assert refined.training_minutes + refined.refinement_minutes == 2.0
+    for config, share in ((refined, seconds / 72), (tiny(steps=100), 0.0)):
+        training.config = config
+        assert training.progress == pytest.approx(min(1.0, max(step / 100, share)))
 
 
 def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
@@ -246,15 +237,17 @@ def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
     assert log.text(numbers) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
 
 
-def test_a_finished_run_that_is_resumed_stays_as_it_is(data, tmp_path):
+def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path):
     """Half of its levels are open, as they were: the mesh is that of the same field."""
     config = tiny(steps=8, start_levels=1, levels_open_by=2.0, learning_rate=0.05, warmup_steps=1, mesh_every=2.0)
-    first = loop.train(load_dataset(data), config, tmp_path)
+    first = loop.train(load_dataset(data), config, tmp_path).model
     again = loop.train(load_dataset(data), config, tmp_path, resume=True)
-    assert again.step == 8 and again.finished and again.model.sdf_field.grid.n_active == 2
+    assert again.step == 8 and again.finished
     x = torch.rand(100, 3) - 0.5
-    assert torch.equal(again.model.sdf_field.sdf(x), first.model.sdf_field.sdf(x))
-    assert torch.equal(again.model.occlusion.cache.vertices, first.model.occlusion.cache.vertices)
+    for model in (again.model, load_run(tmp_path)[0]):
+        assert model.sdf_field.grid.n_active == 2 and torch.equal(model.sdf_field.sdf(x), first.sdf_field.sdf(x))
+        for name in ("vertices", "bits"):
+            assert torch.equal(getattr(model.occlusion.cache, name), getattr(first.occlusion.cache, name))
 
 
 def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
@@ -298,16 +291,16 @@ def test_a_run_that_is_interrupted_ends_when_the_light_has_moved(data, tmp_path,
 @pytest.mark.parametrize("deterministic", [False, True])
 def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch, deterministic):
     """A run whose bits repeat waits for each, another goes on without it."""
-    make, makers, at, used = meshes.make_mesh, [], steps_of(monkeypatch), []
+    make, makers, at = meshes.make_mesh, [], steps_of(monkeypatch)
+    used = calls(monkeypatch, SceneModel, "use_mesh", lambda *_: at[0])
 
     def slowly(*args):
         makers.append(threading.current_thread())
-        time.sleep(0.3)
+        while not deterministic and at[0] < 8:
+            time.sleep(0.001)
         return make(*args)
 
     monkeypatch.setattr(meshes, "make_mesh", slowly)
-    use = SceneModel.use_mesh
-    monkeypatch.setattr(SceneModel, "use_mesh", lambda self, bits: used.append(at[0]) or use(self, bits))
     config = tiny(steps=12, mesh_every=0.5, preview_every=2.0, **{"mesh.background": True}, deterministic=deterministic)
     loop.train(load_dataset(data), config, tmp_path)
     assert threading.main_thread() not in makers and len(makers) == 2

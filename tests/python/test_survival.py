@@ -240,18 +240,20 @@ def test_a_run_in_use_is_refused(data, tmp_path, capsys):
 
 
 def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, tmp_path, capsys):
-    """Refused when it goes on, or refused for its settings when it is to be replaced."""
+    """Refused when it goes on, or refused for its settings when it is to be replaced; the demo replaces none."""
     run = tmp_path / "run"
     assert train(data, run, "--steps", "4") == DONE
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for words in (
-        [other_data, "--resume", "--steps", "9"], [data, "--resume", "--set", "n_levels=5"],
-        [data, "--resume", "--set", "grid_resolution=20"], [data, "--overwrite", "--set", "no_such=1"],
-        [data, "--overwrite", "--set", "box=0"], [data / "none", "--overwrite"],
-        [data, "--overwrite", "--downscale", "99"],
+        ["train", other_data, "--resume", "--steps", "9"], ["train", data, "--resume", "--set", "n_levels=5"],
+        ["train", data, "--resume", "--set", "grid_resolution=20"], ["train", data, "--overwrite", "--set", "no_such=1"],
+        ["train", data, "--overwrite", "--set", "box=0"], ["train", data / "none", "--overwrite"],
+        ["train", data, "--overwrite", "--downscale", "99"], ["demo", "--max-minutes", "-1", "--overwrite"],
+        ["demo", "--seed", "99999999999999999999", "--overwrite"], ["demo"],
     ):  # fmt: skip
-        assert main(["train", *map(str, words), "--out", str(run)]) == BAD_INPUT, words
+        assert main([*map(str, words), "--out", str(run)]) == BAD_INPUT, words
         assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}, words
+    assert "holds a run already" in capsys.readouterr().err
 
 
 def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, tmp_path, monkeypatch):
@@ -282,16 +284,6 @@ def test_data_are_not_replaced_by_results(data, begun, tmp_path, capsys, command
     assert main([*map(str, words), "--out", str(data)]) == BAD_INPUT
     assert "holds a data set, which results would replace" in capsys.readouterr().err
     assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-
-
-def test_the_demo_does_not_replace_a_run(data, tmp_path, capsys):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    for words in ([], ["--max-minutes", "-1", "--overwrite"], ["--seed", "99999999999999999999", "--overwrite"]):
-        assert main(["demo", "--out", str(run), *words]) == BAD_INPUT
-    assert "holds a run already" in capsys.readouterr().err
-    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
 
 
 def test_a_folder_that_was_removed_ends_a_run_with_one_line(data, tmp_path, at_step, capsys):
@@ -368,57 +360,21 @@ def test_resume_auto_begins_again_before_the_first_checkpoint(data, tmp_path, at
     assert "holds a run already" in capsys.readouterr().err and (run / "mesh.glb").is_file()
 
 
-def test_a_log_of_a_killed_run_is_mended(data, tmp_path):
-    """Its last line may be cut, and it may reach beyond the checkpoint from which the run goes on."""
-    run, dataset = tmp_path / "run", load_dataset(data)
-    run.mkdir()
-    loop.train(dataset, tiny(steps=8), run)
+def test_a_damaged_log_is_mended(data, tmp_path):
+    """The last line of a killed run may be cut, and its lines may reach beyond the checkpoint; damage ends no finished run."""
+    run = tmp_path / "run"
+    assert train(data, run, "--steps", "8") == DONE
     whole = (run / METRICS).read_bytes()
     with open(run / METRICS, "ab") as log:
         log.write(b'{"step": 9, "loss": 1.0}\n[1]\n\xff\n{"step": "x"}\n{"step": 10, "lo')
     assert len(read_metrics(run / METRICS)) == 9
     keep_metrics(run / METRICS, 8)
     assert (run / METRICS).read_bytes() == whole
-    with open(run / METRICS, "ab") as log:
-        log.write(b'{"step": 9, "loss": 1.0}\n{"step": 10, "lo')
-    loop.train(dataset, tiny(steps=12), run, resume=True)
-    assert [line["step"] for line in lines_of(run)] == list(range(1, 13))
-
-
-def test_a_damaged_log_does_not_end_a_finished_run(data, tmp_path):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    (run / METRICS).write_text("damaged\n" + (run / METRICS).read_text())
+    (run / METRICS).write_bytes(b"damaged\n" + whole + b'{"step": 9, "loss": 1.0}\n{"step": 10, "lo')
     assert main(["evaluate", str(run), "--data", str(data)]) == DONE
-    assert train(data, run, "--steps", "4", "--resume") == DONE
-    assert [line["step"] for line in lines_of(run)] == [1, 2, 3, 4]
-
-
-def test_a_run_of_many_parts_is_that_of_one(data, tmp_path, monkeypatch):
-    """Each begins from a checkpoint that was written between steps, as after kill -9."""
-    dataset = load_dataset(data)
-    config = tiny(steps=40, deterministic=True, mesh_every=0.15, grid_every=8, open_below=0.0, indirect_every=12,
-                  checkpoint_minutes=0.0)  # fmt: skip
-    for name in ("whole", "parts"):
-        (tmp_path / name).mkdir()
-    loop.train(dataset, config, tmp_path / "whole")
-    save = loop.Training.save
-
-    def saving(training) -> None:
-        save(training)
-        if training.step in (12, 24, 36):
-            raise KeyError
-
-    monkeypatch.setattr(loop.Training, "save", saving)
-    for part in range(3):
-        with pytest.raises(KeyError):
-            loop.train(dataset, config, tmp_path / "parts", resume=part > 0)
-    loop.train(dataset, config, tmp_path / "parts", resume=True)
-    whole, parts = (flat(load_checkpoint(tmp_path / name / "checkpoint.pt")) for name in ("whole", "parts"))
-    assert whole.keys() == parts.keys() and whole["step"] == 40
-    assert [key for key in whole if key != "seconds" and not same(whole[key], parts[key])] == []
-    logs = [[line | {"seconds": 0} for line in lines_of(tmp_path / name)] for name in ("whole", "parts")]
-    assert logs[0] == logs[1]
+    for steps in (8, 12):
+        assert train(data, run, "--steps", str(steps), "--resume") == DONE
+        assert [line["step"] for line in lines_of(run)] == list(range(1, steps + 1))
 
 
 FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "trained/mesh.glb")

@@ -11,7 +11,7 @@ import pytest
 import torch
 from tiny_runs import SMALL, as_options, tiny, train
 
-from splitnerf.training.checkpoint import config_of, load_checkpoint
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
 
@@ -47,60 +47,6 @@ def test_the_error_falls_whatever_steps_and_tables(data, tmp_path, settings):
     assert (grid.stored() is None) == ("table_dtype" not in settings)
     if grid.copy is not None:
         assert torch.equal(grid.stored(), rounded(grid.table, grid.copy.dtype)) and grid.table.dtype == torch.float32
-
-
-def test_visibility_bits_come_back_with_the_checkpoint(data, tmp_path):
-    """Trained, resumed and loaded, a run with occlusion.kind=bits renders with the factors of the mesh that it stored."""
-    from splitnerf.data.dataset import load_dataset
-    from splitnerf.render.renderer import render_maps
-    from splitnerf.training.loop import train as train_scene
-    from splitnerf.pipeline import load_run
-
-    config = preset("cpu").replace(SMALL | {
-        "steps": 24, "occlusion.kind": "bits", "indirect": True, "indirect_every": 5, "occlusion_directions": 256, "open_below": 0.0,
-    })  # fmt: skip
-    dataset = load_dataset(data)
-    trained = train_scene(dataset, config, tmp_path)
-    assert trained.finished and trained.model.occlusion.ready and trained.model.occlusion.radiance.isfinite().all()
-    before = render_maps(trained.model, trained.grid, dataset, 0)
-    model, grid, content = load_run(tmp_path)
-    after = render_maps(model, grid, dataset, 0)
-    ours, stored = model.occlusion, trained.model.occlusion
-    assert len(content["mesh_vertices"]) == len(ours.cache.vertices)
-    assert torch.equal(ours.directions, stored.directions) and len(ours.emitters.vertices) == len(stored.radiance)
-    for name in ("occlusion_d", "occlusion_s", "rgb"):
-        np.testing.assert_allclose(before[name], after[name], atol=0.02, err_msg=name)
-    assert 0.0 < before["occlusion_d"][before["alpha"] > 0.5].mean() <= 1.0
-
-    again = train_scene(dataset, config.replace({"steps": 30}), tmp_path, resume=True)
-    assert again.step == 30 and len(again.model.occlusion.cache.vertices) > 0
-
-
-def test_without_a_mesh_nothing_is_occluded():
-    from splitnerf.render.model import SceneModel
-
-    small = SMALL
-    for kind in ("mlp", "bits", "off"):
-        model = SceneModel(preset("cpu").replace(small | {"occlusion.kind": kind, "shading.method": "split"}))
-        points = torch.rand(5, 3)
-        field = model.surface(points)
-        up = torch.tensor([[0.0, 0.0, 1.0]]).expand(5, 3)
-        shaded = model.shade(model.evaluate_light(), points, field.outputs, field.features, up, up)
-        assert (shaded.occlusion_d == 1).all() and (shaded.occlusion_s == 1).all() and shaded.radiance.isfinite().all()
-
-
-def test_a_deterministic_run_can_be_repeated_bit_by_bit(data, tmp_path):
-    """With all that the trainer keeps."""
-    for name in "ab":
-        assert train(data, tmp_path / name, "--steps", "14", "--seed", "3", "--deterministic") == DONE
-    first, second = (load_checkpoint(tmp_path / name / "checkpoint.pt") for name in "ab")
-    assert config_of(first).run.deterministic and not torch.are_deterministic_algorithms_enabled()
-    for key in first["model"]:
-        assert torch.equal(first["model"][key], second["model"][key]), key
-    for moments, others in zip(first["optimiser"]["state"].values(), second["optimiser"]["state"].values()):
-        assert all(torch.equal(moments[key], others[key]) for key in moments)
-    for key in ("generator", "torch_generator", "occupancy", "mesh_vertices", "mesh_faces"):
-        assert torch.equal(first[key], second[key]), key
 
 
 def test_torch_adds_in_a_fixed_order_where_asked():
