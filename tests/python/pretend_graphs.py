@@ -20,13 +20,7 @@ from torch.utils._pytree import tree_iter
 from splitnerf.training import gpu_step, state
 
 REFUSED = (
-    "_local_scalar_dense",
-    "lift_fresh",
-    "_to_copy",
-    "nonzero",
-    "masked_select",
-    "_unique2",
-    "march_rays",
+    "_local_scalar_dense", "lift_fresh", "_to_copy", "nonzero", "masked_select", "_unique2", "march_rays",
     "sample_rays",
 )
 

@@ -38,6 +38,18 @@ def recording(monkeypatch):
     return pretend_graphs.graphs_on_the_cpu(monkeypatch)
 
 
+def called(function, pool, generator):
+    """In place of `record`: the replay calls the function."""
+    outputs = [None, None]
+    return SimpleNamespace(replay=lambda: outputs.__setitem__(slice(None), function())), outputs
+
+
+def same_lines(folder) -> None:
+    """The runs `recorded` and `called` have the same numbers but for their seconds."""
+    for ours, theirs in zip(lines_of(folder / "recorded"), lines_of(folder / "called"), strict=True):
+        assert ours | {"seconds": 0} == theirs | {"seconds": 0}
+
+
 @pytest.mark.parametrize("settings", [
     {}, {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
     {"table_dtype": "float16", "sampling.min_weight": 0.0, "grid_every": 3, "target_samples": 16384},
@@ -51,18 +63,11 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
     trainer.train(load_dataset(data), config, tmp_path / "recorded")
     assert recording["replayed"] > 60 and recording["recorded"] < 60
-    called = []
-
-    def call(function, pool, generator):
-        outputs = [None, None]
-        called.append(lambda: outputs.__setitem__(slice(None), function()))
-        return SimpleNamespace(replay=called[-1]), outputs
-
-    monkeypatch.setattr(gpu_step, "record", call)
+    in_place = []
+    monkeypatch.setattr(gpu_step, "record", lambda *arguments: in_place.append(called(*arguments)) or in_place[-1])
     trainer.train(load_dataset(data), config, tmp_path / "called")
-    assert len(called) == recording["recorded"]
-    for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
-        assert ours | {"seconds": 0} == theirs | {"seconds": 0}
+    assert len(in_place) == recording["recorded"]
+    same_lines(tmp_path)
 
 
 class Taken(NamedTuple):
@@ -123,12 +128,6 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
             return trainer.train(load_dataset(data), config, run, device="cuda"), steps
 
 
-def called(function, pool, generator):
-    """In place of `record`: the replay calls the function."""
-    outputs = [None, None]
-    return SimpleNamespace(replay=lambda: outputs.__setitem__(slice(None), function())), outputs
-
-
 def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(data, tmp_path, monkeypatch, recording):
     def ball(photos, hull, config):
         shape = shape_of_ball(16)
@@ -165,23 +164,16 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     other, _ = schedule_of_a_gpu(data, tmp_path / "called", monkeypatch, recording)
     for a, b in zip(trained.model.parameters(), other.model.parameters(), strict=True):
         assert torch.equal(a, b)
-    for ours, theirs in zip(lines_of(tmp_path / "recorded"), lines_of(tmp_path / "called"), strict=True):
-        assert ours | {"seconds": 0} == theirs | {"seconds": 0}
+    same_lines(tmp_path)
 
 
 def test_a_capacity_changes_roundings_alone(data):
     """Losses and gradients of one step with room for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
-        "cpu",
-        open_below=0.0,
-        n_levels=6,
-        target_samples=3000,
-        initial_variance=0.4,
-        eikonal_weight=0.0,
-        entropy_weight=0.0,
+        "cpu", open_below=0.0, n_levels=6, target_samples=3000, initial_variance=0.4, eikonal_weight=0.0, entropy_weight=0.0,
         shape_priors_until=1.0,
-    )
+    )  # fmt: skip
     model = SceneModel(config)
     generator = torch.Generator().manual_seed(0)
     source = PixelSource(dataset, 0.85, generator)
@@ -247,9 +239,7 @@ def test_waiting_while_recording_is_refused():
         with pytest.raises(RuntimeError, match="waits"):
             pretend_graphs.record(lambda: waits(torch.ones(3)), None, generator)
     x, total = torch.ones(3), torch.zeros(3)
-    graph, drawn = pretend_graphs.record(
-        lambda: total.add_(x * 2) + torch.rand(3, generator=generator), None, generator
-    )
+    graph, drawn = pretend_graphs.record(lambda: total.add_(x * 2) + torch.rand(3, generator=generator), None, generator)
     assert not total.any()
     graph.replay()
     first = drawn.clone()

@@ -59,8 +59,7 @@ def furnished_corner() -> Asset:
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     tilts = np.concatenate([random.uniform(-0.4, 0.4, (8, 8, 2)), np.ones((8, 8, 1))], axis=2)
     material = Material(
-        metallic=1.0,
-        albedo_texture=random.uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32),
+        metallic=1.0, albedo_texture=random.uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32),
         roughness_metallic_texture=random.uniform(0.15, 0.9, (8, 8, 2)).astype(np.float32),
         normal_texture=(tilts / np.linalg.norm(tilts, axis=2, keepdims=True)).astype(np.float32),
     )

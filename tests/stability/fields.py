@@ -62,10 +62,8 @@ def on_a_lattice(rows: Rows) -> Rows:
 def network() -> Rows:
     draw = Draw(5)
     return {
-        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(),
-        "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
-        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH),
-        "out_bias": draw.normal(OUTPUTS).float(),
+        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(), "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
+        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH), "out_bias": draw.normal(OUTPUTS).float(),
     }
 
 
@@ -92,18 +90,9 @@ def values(rows: Rows, shared: Rows) -> Rows:
 
 def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> Entry:
     return Entry(
-        name,
-        draw=draw_positions,
-        call=call,
-        smooth=("positions",),
-        smooth_shared=("table",),
-        shared={"table": grid()["table"].to(dtype).float()},
-        conditioned=True,
-        bound=2e-6,
-        gradient_bound=4e-6,
-        exact=exact,
-        exact_bound=1e-14,
-        reason=BY_CELL,
+        name, draw=draw_positions, call=call, smooth=("positions",), smooth_shared=("table",),
+        shared={"table": grid()["table"].to(dtype).float()}, conditioned=True, bound=2e-6, gradient_bound=4e-6,
+        exact=exact, exact_bound=1e-14, reason=BY_CELL,
     )
 
 
@@ -115,27 +104,14 @@ ENTRIES = (
         for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
     ),
     Entry(
-        "sdf_field",
-        draw=lambda draw, n: on_a_lattice({"positions": 2 * draw_positions(draw, n)["positions"] - 1}),
-        repair=on_a_lattice,
-        call=field,
-        smooth_shared=("table", *LEARNED),
-        shared=learned() | grid(),
-        conditioned=True,
-        bound=4e-6,
-        exact=exact_fields.sdf_field,
-        exact_bound=1e-11,
+        "sdf_field", draw=lambda draw, n: on_a_lattice({"positions": 2 * draw_positions(draw, n)["positions"] - 1}),
+        repair=on_a_lattice, call=field, smooth_shared=("table", *LEARNED), shared=learned() | grid(), conditioned=True,
+        bound=4e-6, exact=exact_fields.sdf_field, exact_bound=1e-11,
         reason="sums of 15 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
     ),
     Entry(
-        "sdf_values",
-        call=values,
-        shared=network() | grid(),
-        conditioned=True,
-        bound=4e-6,
-        exact=exact_fields.sdf_values,
-        exact_bound=1e-11,
-        reason="the two above",
+        "sdf_values", call=values, shared=network() | grid(), conditioned=True, bound=4e-6,
+        exact=exact_fields.sdf_values, exact_bound=1e-11, reason="the two above",
         draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
         repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},
     ),

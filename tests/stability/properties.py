@@ -196,9 +196,7 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     directions = draw.directions(n)
     origins = targets - directions * draw.mixed((0.0, 1e-7, 1.0, 3.0, 1e4), draw.uniform(n, 1, high=4))
     rows = {
-        "rays_o": origins.float(),
-        "rays_d": directions.float(),
-        "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
+        "rays_o": origins.float(), "rays_d": directions.float(), "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
     }
     found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box, step, limit)
     ray, start = found.ray_indices, found.t_starts.double()
@@ -319,16 +317,12 @@ PROPERTIES = (
     Property("occlusion_factors", shares, "in [0, 1] under black, dim, bright and single lights", chunk=1024),
     Property("occlusion_factors, blocked", all_blocked, "0 where all rays are blocked, in black light too", chunk=1024),
     Property(
-        "incoming_light",
-        light_arriving,
-        "finite, from above both horizons, and from the sky or the mesh alone; none into a closed body",
-        size=8,
+        "incoming_light", light_arriving,
+        "finite, from above both horizons, and from the sky or the mesh alone; none into a closed body", size=8,
         chunk=1024,
     ),
     Property(
-        "visibility_bits",
-        bits_apart,
-        "open or blocked above the horizon, neither below; a convex body blocks nothing",
+        "visibility_bits", bits_apart, "open or blocked above the horizon, neither below; a convex body blocks nothing",
         chunk=1024,
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),

@@ -21,20 +21,9 @@ PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 SOURCES = ("cpp", "python/splitnerf/ops")
 COLUMNS = (
-    "operator",
-    "inputs",
-    "worst forward",
-    "promised",
-    "worst gradient",
-    "promised gradient",
-    "without condition",
-    "gradient without condition",
-    "gradient to shared",
-    "float64 against exact",
-    "float32 against exact",
-    "not finite",
-    "holds",
-    "reason",
+    "operator", "inputs", "worst forward", "promised", "worst gradient", "promised gradient", "without condition",
+    "gradient without condition", "gradient to shared", "float64 against exact", "float32 against exact", "not finite",
+    "holds", "reason",
 )
 
 
@@ -83,20 +72,11 @@ def verdict_line(v: Verdict) -> str:
 
 def row_of(r: Result) -> list[str]:
     return [
-        r.entry.name,
-        str(r.cases),
-        number(r.forward),
-        number(r.entry.bound),
-        number(r.gradient) if r.entry.smooth else "none",
-        number(r.entry.gradient_bound) if r.entry.smooth else "none",
-        number(r.plain_forward),
-        number(r.plain_gradient) if r.entry.smooth else "none",
-        number(r.shared) if r.entry.smooth_shared else "none",
-        number(r.exact),
-        number(r.single_exact),
-        str(r.broken),
-        "yes" if r.holds else "NO",
-        r.entry.reason,
+        r.entry.name, str(r.cases), number(r.forward), number(r.entry.bound),
+        number(r.gradient) if r.entry.smooth else "none", number(r.entry.gradient_bound) if r.entry.smooth else "none",
+        number(r.plain_forward), number(r.plain_gradient) if r.entry.smooth else "none",
+        number(r.shared) if r.entry.smooth_shared else "none", number(r.exact), number(r.single_exact), str(r.broken),
+        "yes" if r.holds else "NO", r.entry.reason,
     ]
 
 
