@@ -116,7 +116,7 @@ TRANSFORMS = {
     "no transforms": (lambda root: [path.unlink() for path in root.glob("*.json")], "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model"),
     "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
     "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
-    "larger image": (picture("train/r_4.png", SIZE, SIZE + 1, 4), f"r_4.png: is {SIZE + 1}x{SIZE}, but r_0.png is {SIZE}x{SIZE}"),
+    "larger image": (picture("train/r_4.png", SIZE, SIZE + 4, 4), f"r_4.png: is {SIZE + 4}x{SIZE}, r_0.png is {SIZE}x{SIZE}, and one lens is stated for both"),
     "neither alpha nor mask": (picture("train/r_4.png", SIZE, SIZE, 3), "r_4.png: has no alpha channel and its frame no mask_path"),
     "empty masks": (alpha(lambda i: np.zeros((SIZE, SIZE))), "train: every mask is empty"),
     "full masks": (alpha(lambda i: np.ones((SIZE, SIZE))), "train: nothing says where the object is"),

@@ -356,13 +356,6 @@ def test_what_is_seen_pulls_the_light():
     assert not torch.allclose(light(up, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
 
 
-def test_photos_of_two_sizes_are_refused_before_any_work(tmp_path, capsys):
-    write_photos(tmp_path / "photos", 4)
-    Image.fromarray(np.random.default_rng(0).integers(0, 255, (90, 60, 3), np.uint8)).save(tmp_path / "photos" / "small.png")
-    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "data")]) == 2
-    assert "small.png is 60x90; give photos of one size" in capsys.readouterr().err
-
-
 def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
     world, _ = seen_world()
     monkeypatch.setattr(preparation, "read_upright", lambda path: np.zeros((240, 320, 3), np.uint8))

@@ -20,7 +20,7 @@ def from_above(focal: float = 100.0, centre: tuple[float, float] = (50.0, 50.0),
     """A camera on the z axis that looks down."""
     pose = torch.eye(4)
     pose[2, 3] = DISTANCE
-    return Cameras(pose[None], torch.tensor([[focal, focal, *centre]]), torch.tensor(size))
+    return Cameras(pose[None], torch.tensor([[focal, focal, *centre]]), torch.tensor([size]))
 
 
 def sphere(radius: float, height: float = 0.0) -> trimesh.Trimesh:
@@ -77,7 +77,7 @@ def test_all_cameras_count():
     pose = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0]))  # from below
     pose[2, 3] = -DISTANCE
     above = from_above()
-    both = Cameras(torch.cat([above.poses, pose[None]]), above.intrinsics.repeat(2, 1), above.size)
+    both = Cameras(torch.cat([above.poses, pose[None]]), above.intrinsics.repeat(2, 1), above.sizes.repeat(2, 1))
     mesh = sphere(0.5)
     found, z = seen(mesh, both), mesh.vertices[:, 2]
     assert found[np.abs(z) > 0.2].all() and not found[np.abs(z) < 0.05].any()

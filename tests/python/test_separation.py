@@ -217,7 +217,7 @@ class TestReading:
 def test_masks_of_odd_sizes(tmp_path, size):
     write_ball_on_floor(tmp_path, 8)
     photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
-    odd = replace(photos, images=np.ones((8, *size, 4), np.float32))
+    odd = replace(photos, images=np.ones((8, *size, 4), np.float32), sizes=None)
     region = Region(np.ones((CELLS,) * 3, bool), None)
     assert find_mask(TrueField(photos.world_from_box), region, odd, 0).shape == size
 

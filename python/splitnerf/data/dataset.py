@@ -49,8 +49,11 @@ class Dataset:
         frame_names: Names of the images' files without extension, or of the view folders.
         image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
-        known: [n, H, W] bool, the pixels that say something: not what a mask ignores, and not what an undistorted photo
-            does not cover; the others are 0 in `images`. None where all are known.
+        known: [n, H, W] bool, the pixels that say something: not what a mask ignores, not what an undistorted photo
+            does not cover, and not what lies beside a photo that is smaller than others; the others are 0 in `images`. None
+            where all are known.
+        sizes: [n, 2] int, height and width of the photos, each in the upper left corner of its H x W pixels; None stands for
+            H and W.
         origin: [3] float64, the point of the data's files that is the origin of the data's world here; 0 but where the
             files' origin is too far away for float32.
         exposures: [n] or [n, 3] float64, the factors by which the images' linear values were divided; None stands for 1.
@@ -73,6 +76,7 @@ class Dataset:
     image_paths: list[Path]
     box_from_world: np.ndarray
     known: np.ndarray | None = None
+    sizes: np.ndarray | None = None
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     exposures: np.ndarray | None = None
     stated: np.ndarray | None = None
@@ -82,6 +86,8 @@ class Dataset:
 
     def __post_init__(self) -> None:
         self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
+        if self.sizes is None:
+            self.sizes = np.tile(self.images.shape[1:3], (len(self.images), 1))
         self.exposures, self.stated = (np.ones(len(self.images)) if x is None else x for x in (self.exposures, self.stated))
 
     def __len__(self) -> int:
@@ -89,11 +95,23 @@ class Dataset:
 
     @property
     def height(self) -> int:
+        """H, the height of the tallest photo."""
         return self.images.shape[1]
 
     @property
     def width(self) -> int:
+        """W, the width of the widest photo."""
         return self.images.shape[2]
+
+    def cropped(self, view: int, picture: np.ndarray) -> np.ndarray:
+        """The part of a picture [H, W, ...] that a photo covers."""
+        height, width = self.sizes[view]
+        return picture[:height, :width]
+
+    def padded(self, picture: np.ndarray) -> np.ndarray:
+        """A picture [h, w, ...] of a photo's size as [H, W, ...], 0 beside it."""
+        beside = [(0, self.height - picture.shape[0]), (0, self.width - picture.shape[1])]
+        return np.pad(picture, beside + [(0, 0)] * (picture.ndim - 2)) if np.any(beside) else picture
 
     @property
     def world_from_box(self) -> np.ndarray:
@@ -132,7 +150,7 @@ class Dataset:
         """The split with photos averaged down by a whole factor, in 16 bits.
 
         Args:
-            factor: At least 2, at most the photos' shorter edge.
+            factor: At least 2, at most the smallest photo's shorter edge.
             max_memory: GB for all photos, see :func:`splitnerf.data.pixels.room_for_photos`; what needs more goes to a file.
             average: Takes a photo's codes [H, W, 4], the factor, and the known pixels [h, w] of the average (None: all); gives
                 the average [h, w, 4] uint16, with whole colours, see the attribute. By default averages are those of `downscale`.
@@ -157,6 +175,7 @@ class Dataset:
             images=Photos(codes, self.images.exposures),
             intrinsics=self.intrinsics / np.float32(factor),
             known=known,
+            sizes=self.sizes // factor,
             whole=average is not None,
         )
 
@@ -169,6 +188,7 @@ class Dataset:
             self,
             images=self.images.select(views),
             known=None if self.known is None else self.known[views],
+            sizes=self.sizes[views],
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
             exposures=self.exposures[views],
@@ -240,6 +260,7 @@ def load_dataset(
         image_paths=[frame.image_path for frame in frames],
         box_from_world=box_from_world,
         known=loader.known,
+        sizes=loader.sizes,
         origin=origin,
         exposures=loader.exposures,
         stated=np.array([frame.exposure for frame in frames]),
@@ -331,11 +352,8 @@ def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo], masked: 
     try:
         if not masked:
             return box_of_views(poses, intrinsics, np.array([photo.size for photo in photos]))
-        silhouettes, seen = np.stack([photo.silhouette for photo in photos]), [photo.seen for photo in photos]
-        known = None
-        if any(one is not None for one in seen):
-            known = np.stack([np.ones(silhouettes.shape[1:], bool) if one is None else one for one in seen])
-        return estimate_box(silhouettes, poses, intrinsics / silhouette_factor(*photos[0].size), known)
+        intrinsics /= [[silhouette_factor(*photo.size)] for photo in photos]
+        return estimate_box([photo.silhouette for photo in photos], poses, intrinsics, [photo.seen for photo in photos])
     except MasksContradict as error:
         names = [frames[i].image_path.name for i in error.views]
         where = f" (those of {', '.join(names[:5])} and the others)" if names else ""

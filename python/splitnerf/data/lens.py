@@ -113,8 +113,20 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
     return numbers, Distortion(radial, tangential, fisheye) if bends else None
 
 
+def check_shape(lens: dict, size: tuple[int, int], path: object) -> None:
+    """Raises InputError where an image of this (height, width) is no larger or smaller copy of the one that its lens is stated
+    for, by more than rounding: it is turned or cropped."""
+    height, width = size
+    w, h = lens.get("w", width), lens.get("h", height)
+    if abs(width * h - height * w) > max(w, h):
+        raise InputError(
+            f"{path}: is {width}x{height}, but its lens is stated for {w:g}x{h:g}; turn the image, or repair 'w' and 'h'"
+        )
+
+
 def lens_intrinsics(lens: dict, size: tuple[int, int]) -> np.ndarray:
-    """[4] float64 (fx, fy, cx, cy) in pixels of an image of this (height, width)."""
+    """[4] float64 (fx, fy, cx, cy) in pixels of an image of this (height, width), a scaled copy of the one that the lens is
+    stated for."""
     height, width = size
     scale_x, scale_y = width / lens.get("w", width), height / lens.get("h", height)
     if "fl_x" in lens:

@@ -36,6 +36,8 @@ class Loader:
 
     Attributes:
         frames: The frames.
+        sizes: [n, 2] height and width of the photos as they are kept, in the upper left corner of an array for the tallest
+            and the widest.
         exposures: [n] float64, the factors of the photos' linear values, as they are kept.
 
     Raises:
@@ -44,10 +46,12 @@ class Loader:
 
     def __init__(self, root: Path, frames: Sequence[Frame], downscale: int, reading: Reading, keep: bool = True):
         self.frames, self.downscale, self.separated = frames, downscale, reading.separated
-        (height, width), exact = check_files(frames, downscale)
-        shape = (len(frames), height // downscale, width // downscale)
+        sizes, exact = check_files(frames, downscale)
+        height, width = sizes[sizes.prod(axis=1).argmax()].tolist()  # of the largest
+        self.sizes = sizes // downscale
+        shape = (len(frames), *self.sizes.max(axis=0).tolist())
         kind, bent = np.dtype(np.uint8 if exact else np.uint16), any(frame.distortion is not None for frame in frames)
-        hides = bent or any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
+        hides = bent or bool((self.sizes != shape[1:]).any()) or any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
         floats = bent or any(f.gamma != 0 or f.image_path.suffix.lower() in HDR_SUFFIXES for f in frames)
         work = height * width * (WORK_BENT if floats else WORK)
         size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
@@ -83,10 +87,8 @@ class Loader:
         with ThreadPoolExecutor(max_workers=self.threads) as pool:
             photos = list(pool.map(lambda i: self._load(i, mask_kind), range(len(self.frames))))
         self.exposures = np.array([frame.exposure * photo.scale for frame, photo in zip(self.frames, photos)])
-        self.known = None
-        if self._known is not None and any(photo.seen is not None for photo in photos):
-            self.known = self._known
-            self.known[[photo.seen is None for photo in photos]] = True
+        smaller = bool((self.sizes != self.sizes.max(axis=0)).any())
+        self.known = self._known if smaller or any(photo.seen is not None for photo in photos) else None
         return photos
 
     @property
@@ -96,9 +98,10 @@ class Loader:
 
     def _load(self, i: int, mask_kind: str) -> Photo:
         photo = load_photo(self.frames[i], self.downscale, mask_kind, self.separated)
+        height, width = self.sizes[i]
         if self.codes is not None:
-            self.codes[i] = encoded(photo.rgba, self.codes.dtype)
+            self.codes[i, :height, :width] = encoded(photo.rgba, self.codes.dtype)
             forget_pages(self.codes)
-        if self._known is not None and photo.known is not None:
-            self._known[i] = photo.known
+        if self._known is not None:
+            self._known[i, :height, :width] = True if photo.known is None else photo.known
         return replace(photo, rgba=None, known=None)

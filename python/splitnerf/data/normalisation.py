@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,18 +28,19 @@ class MasksContradict(ValueError):
 
 
 def estimate_box(
-    silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray, known: np.ndarray | None = None
-) -> np.ndarray:
+    silhouettes: Sequence[np.ndarray], poses: np.ndarray, intrinsics: np.ndarray,
+    known: Sequence[np.ndarray | None] | None = None,
+) -> np.ndarray:  # fmt: skip
     """Estimates the similarity from the data's world to the frame where the object fits the box [-1.5, 1.5]^3.
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
     Where the hull's bounding sphere about the origin has a radius in (0.4, 1.4] the data's frame is kept.
 
     Args:
-        silhouettes: [n, H, W] bool, true on the object.
+        silhouettes: n arrays [H, W] bool, true on the object, each of its own size.
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4], (fx, fy, cx, cy) in pixels of `silhouettes`.
-        known: [n, H, W] bool, the pixels that say something; None for all.
+        known: n arrays [H, W] bool, the pixels that say something; None for all.
 
     Returns:
         [4, 4] float64, uniform scale and translation, or the identity.
@@ -47,13 +49,13 @@ def estimate_box(
         MasksContradict: No point of space projects into the masks.
         ValueError: All cameras stand at one place.
     """
-    n, height, width = silhouettes.shape
+    n, sizes = len(silhouettes), np.array([silhouette.shape for silhouette in silhouettes])
     poses, intrinsics = poses.astype(np.float64), intrinsics.astype(np.float64)
     _check_places(poses)
     views = [MaskView.of(*view) for view in zip(silhouettes, poses, intrinsics, [None] * n if known is None else known)]
     centre = first_centre(silhouettes, poses, intrinsics)
     depth = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
-    half = np.full(3, (depth * 0.5 * np.hypot(width / intrinsics[:, 0], height / intrinsics[:, 1])).max())
+    half = np.full(3, (depth * 0.5 * np.hypot(*(sizes[:, ::-1] / intrinsics[:, :2]).T)).max())
     for resolution in (COARSE, FINE):
         cell = 2 * half.max() / resolution
         grid = cell_centres(centre, half, cell)
@@ -111,16 +113,15 @@ def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
 
 
-def first_centre(silhouettes: np.ndarray, poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
+def first_centre(silhouettes: Sequence[np.ndarray], poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
     """The point [3] nearest to all optical axes or, where these are about parallel, to the rays through the middles of
     the silhouettes; arguments as for `estimate_box`, float64."""
     origins, axes = poses[:, :3, 3], poses[:, :3, 2]
     if spread_of(axes) > PARALLEL:
         return nearest_to_rays(origins, axes)
-    filled = silhouettes.any(axis=(1, 2))
-    rows, columns = (np.arange(size) + 0.5 for size in silhouettes.shape[1:])
-    area = np.maximum(silhouettes.sum(axis=(1, 2)), 1)
-    x, y = silhouettes.sum(axis=1) @ columns / area, silhouettes.sum(axis=2) @ rows / area
+    filled = np.array([silhouette.any() for silhouette in silhouettes])
+    middles = [np.argwhere(silhouette).mean(axis=0) if silhouette.any() else (0, 0) for silhouette in silhouettes]
+    y, x = np.add(middles, 0.5).T
     fx, fy, cx, cy = intrinsics.T
     local = np.stack([(x - cx) / fx, (cy - y) / fy, -np.ones_like(x)], axis=-1)
     rays = np.einsum("nij,nj->ni", poses[:, :3, :3], local)

@@ -15,7 +15,7 @@ from splitnerf.data.images import (
     HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_codes, read_header, read_image,
 )  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.lens import lens_intrinsics, undistort
+from splitnerf.data.lens import check_shape, lens_intrinsics, undistort
 from splitnerf.data.pixels import averaged_codes, decoded, encoded
 from splitnerf.errors import InputError
 
@@ -120,14 +120,14 @@ def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
     return interpolate(planes, (height, width), mode="bilinear", align_corners=False)[0, 0].numpy()
 
 
-def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int], bool]:
-    """The size (height, width) of all photos, and whether bytes hold their values exactly, by the files' headers alone.
+def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bool]:
+    """The sizes [n, 2] (height, width) of the photos, and whether bytes hold their values exactly, by the files' headers alone.
 
     Raises:
-        InputError: A file is missing or no image, photos or masks have another size than the first photo, or all are too
-            small for the downscale.
+        InputError: A file is missing or no image, a photo has another shape than its lens says, a mask has another size than
+            its photo, or a photo is too small for the downscale.
     """
-    size, exact = None, downscale == 1 and all(frame.distortion is None for frame in frames)
+    sizes, exact = [], downscale == 1 and all(frame.distortion is None for frame in frames)
     for frame in frames:
         path = frame.image_path
         if path.suffix.lower() not in LDR_SUFFIXES + HDR_SUFFIXES:
@@ -135,22 +135,35 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[tuple[int, int
         height, width, _, bits = read_header(path)
         if downscale > min(height, width):
             raise InputError(f"{path}: is {width}x{height}, too small for downscale {downscale}; use a smaller factor")
-        size = size or (height, width)
-        if (height, width) != size:
-            raise InputError(
-                f"{path}: is {width}x{height}, but {frames[0].image_path.name} is {size[1]}x{size[0]}; make all images the "
-                "same size"
-            )
+        check_shape(frame.lens, (height, width), path)
+        sizes.append((height, width))
         exact = exact and bits == 8 and frame.gamma == 0
         for mask_path in filter(None, (frame.mask_path, frame.dynamic_mask_path)):
             mask = read_header(mask_path)
-            if mask[:2] != size:
+            if mask[:2] != (height, width):
                 raise InputError(
                     f"{mask_path}: is {mask.width}x{mask.height}, its image {path.name} is {width}x{height}; make them the "
                     "same size"
                 )
             exact = exact and mask.bits == 8
-    return size, exact
+    _check_lenses(frames, sizes)
+    return np.array(sizes), exact
+
+
+def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> None:
+    """Raises InputError where one angle or principal point is stated for photos of two shapes: only a focal length in pixels
+    can be that of a camera that was turned."""
+    first: dict[str, int] = {}
+    for i, (frame, (height, width)) in enumerate(zip(frames, sizes)):
+        if "w" in frame.lens or not frame.lens.keys() & {"camera_angle_x", "cx", "cy"}:
+            continue
+        j = first.setdefault(str(sorted(frame.lens.items())), i)
+        if abs(width * sizes[j][0] - height * sizes[j][1]) >= max(*sizes[j], height, width):
+            other = f"{frames[j].image_path.name} is {sizes[j][1]}x{sizes[j][0]}"
+            raise InputError(
+                f"{frame.image_path}: is {width}x{height}, {other}, and one lens is stated for both; give each frame its own "
+                "'fl_x', 'fl_y', 'cx', 'cy', 'w' and 'h'"
+            )
 
 
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:

@@ -43,10 +43,10 @@ def read_relit(dataset: Dataset, index: int, name: str) -> np.ndarray:
         InputError: The image is missing, unreadable, has no alpha or another size than the view's.
     """
     path = relit_path(dataset.image_paths[index], name)
-    pixels = read_map(dataset.image_paths[index], path, 4, dataset)
+    pixels = read_map(dataset, index, path, 4)
     if pixels is None:
         raise InputError(f"{path}: no such image, the truth of {dataset.frame_names[index]} under {name}; add it")
-    return decoded(averaged_codes(pixels[..., :4], dataset.downscale))
+    return dataset.padded(decoded(averaged_codes(pixels[..., :4], dataset.downscale)))
 
 
 def map_files(folder: Path, *, prefixed: bool = False) -> dict[str, Path]:

@@ -112,7 +112,7 @@ def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
     Raises:
         InputError: A map exists but is unreadable, has too few channels or another size than its image.
     """
-    return [_load_view(path, dataset) for path in dataset.image_paths]
+    return [_load_view(dataset, view) for view in range(len(dataset))]
 
 
 def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -135,14 +135,14 @@ def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.where(known[..., None], normals, 0).astype(np.float32), known
 
 
-def read_map(image_path: Path, path: Path, channels: int, dataset: Dataset) -> np.ndarray | None:
+def read_map(dataset: Dataset, view: int, path: Path, channels: int) -> np.ndarray | None:
     """Reads a map that belongs to a view, at the file's own size.
 
     Args:
-        image_path: The view's image.
+        dataset: The split.
+        view: The number of the view, whose image the map must fit.
         path: The map's file.
         channels: The least number of channels.
-        dataset: The split, whose images the map must fit.
 
     Returns:
         [H, W, C] float32, or None where there is no such file.
@@ -155,38 +155,42 @@ def read_map(image_path: Path, path: Path, channels: int, dataset: Dataset) -> n
     pixels = read_image(path)
     if pixels.shape[2] < channels:
         raise InputError(f"{path}: needs {channels} channels, has {pixels.shape[2]}; re-export it")
-    if (pixels.shape[0] // dataset.downscale, pixels.shape[1] // dataset.downscale) != (dataset.height, dataset.width):
+    if (pixels.shape[0] // dataset.downscale, pixels.shape[1] // dataset.downscale) != tuple(dataset.sizes[view]):
         found = f"{pixels.shape[1]}x{pixels.shape[0]}"
-        raise InputError(f"{path}: is {found}, not the size of {image_path.name}; re-export it")
+        raise InputError(f"{path}: is {found}, not the size of {dataset.image_paths[view].name}; re-export it")
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
     return pixels
 
 
-def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
-    factor, in_folder = dataset.downscale, image_path.name == view_folders.PHOTO
+def _load_view(dataset: Dataset, view: int) -> ViewTruth:
+    image_path, factor = dataset.image_paths[view], dataset.downscale
+    in_folder = image_path.name == view_folders.PHOTO
     truth = ViewTruth(image_path.parent.name if in_folder else image_path.stem)
 
     def read(ending: str, channels: int) -> np.ndarray | None:
         path = image_path.with_name(ending if in_folder else f"{image_path.stem}_{ending}")
-        return read_map(image_path, path, channels, dataset)
+        return read_map(dataset, view, path, channels)
+
+    def average(pixels: np.ndarray) -> np.ndarray:
+        return dataset.padded(area_average(pixels, factor))
 
     albedo = read("albedo.png", 4)
     if albedo is not None and in_folder:
-        averaged = area_average(np.concatenate([albedo[..., :3] * albedo[..., 3:4], albedo[..., 3:4]], axis=-1), factor)
+        averaged = average(np.concatenate([albedo[..., :3] * albedo[..., 3:4], albedo[..., 3:4]], axis=-1))
         truth.albedo = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
     elif albedo is not None:
-        truth.albedo = srgb_to_linear(decoded(averaged_codes(albedo, factor))[..., :3])
+        truth.albedo = dataset.padded(srgb_to_linear(decoded(averaged_codes(albedo, factor))[..., :3]))
 
     orm = read("orm.png", 4)
     if orm is not None:
-        alpha = area_average(orm[..., 3], factor)
-        averaged = area_average(orm[..., 1:3] * orm[..., 3:], factor) / np.maximum(alpha, 1e-8)[..., None]
+        alpha = average(orm[..., 3])
+        averaged = average(orm[..., 1:3] * orm[..., 3:]) / np.maximum(alpha, 1e-8)[..., None]
         truth.roughness, truth.metallic = averaged[..., 0], averaged[..., 1]
 
     exact = read("normal.exr", 4)
     if exact is not None:
-        averaged = area_average(exact, factor)
+        averaged = average(exact)
         truth.normal, truth.normal_mask = _unit(averaged[..., :3], averaged[..., 3] > OPAQUE)
         return truth
     encoded = read("normal.png", 3)
@@ -194,13 +198,13 @@ def _load_view(image_path: Path, dataset: Dataset) -> ViewTruth:
         return truth
     alpha = read_image(image_path)[..., -1]
     if in_folder or image_path.with_name(f"{image_path.stem}_alpha.png").is_file():
-        averaged = area_average((2 * encoded[..., :3] - 1) * alpha[..., None], factor)
-        truth.normal, truth.normal_mask = _unit(averaged, area_average(alpha, factor) > OPAQUE)
+        averaged = average((2 * encoded[..., :3] - 1) * alpha[..., None])
+        truth.normal, truth.normal_mask = _unit(averaged, average(alpha) > OPAQUE)
     else:
         normals, known = decode_clipped_normals(encoded[..., :3])
         known &= alpha > OPAQUE
-        share = area_average(known.astype(np.float32), factor)
-        truth.normal, truth.normal_mask = _unit(area_average(normals * known[..., None], factor), share >= 0.5)
+        share = average(known.astype(np.float32))
+        truth.normal, truth.normal_mask = _unit(average(normals * known[..., None]), share >= 0.5)
     return truth
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.frames import read_frames
-from splitnerf.data.images import read_image
+from splitnerf.data.images import read_header
 from splitnerf.data.layouts.transforms import read_camera_path
-from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.lens import check_shape, lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_VIEWS
@@ -109,7 +109,7 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
 def data_views(
     root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()
 ) -> list[View]:
-    """The cameras of a data set's split, in the data's world; the images' size is the default.
+    """The cameras of a data set's split, in the data's world; each image's size is the default.
 
     Raises:
         InputError: The data cannot be used, or the size has another shape than the images.
@@ -117,8 +117,13 @@ def data_views(
     if not root.is_dir():
         raise InputError(f"{root}: no such folder; give the folder of a data set")
     frames, _ = read_frames(root, split, reading)
-    height, width = read_image(frames[0].image_path).shape[:2]
-    return [_lens_view(f.pose, f.lens | {"w": width, "h": height}, size, str(root), (width, height)) for f in frames]
+    views = []
+    for frame in frames:
+        height, width, *_ = read_header(frame.image_path)
+        check_shape(frame.lens, (height, width), frame.image_path)
+        lens = {"w": width, "h": height} | frame.lens
+        views.append(_lens_view(frame.pose, lens, size, str(frame.image_path), (width, height)))
+    return views
 
 
 def path_views(path: Path, size: tuple[int, int | None] | None) -> list[View]:

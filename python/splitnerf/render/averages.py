@@ -39,7 +39,7 @@ def averaging_factor(dataset: Dataset, config: Config) -> int:
     The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a
     median over the photos.
     """
-    box, most = config.constants.box, max(1, min(dataset.height, dataset.width) // LEAST_EDGE)
+    box, most = config.constants.box, max(1, int(dataset.sizes.min()) // LEAST_EDGE)
     pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)
     cell = 2 * box / config.finest_cells
     return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, most))

@@ -17,23 +17,23 @@ GRAZING = 0.05  # cosine between the surface's normal and a line of sight below 
 
 
 class Cameras(NamedTuple):
-    """The cameras of photos of one size.
+    """The cameras of photos.
 
     Attributes:
         poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, scene units.
         intrinsics: [n, 4] float32 fx, fy, cx, cy, pixels.
-        size: [2] int64 height and width, pixels.
+        sizes: [n, 2] int64 height and width, pixels.
     """
 
     poses: Tensor
     intrinsics: Tensor
-    size: Tensor
+    sizes: Tensor
 
     @classmethod
     def of(cls, photos: Dataset) -> Cameras:
         """The cameras of a data set."""
         poses, intrinsics = (torch.from_numpy(x).float() for x in (photos.poses, photos.intrinsics))
-        return cls(poses, intrinsics, torch.tensor([photos.height, photos.width]))
+        return cls(poses, intrinsics, torch.from_numpy(photos.sizes).long())
 
 
 def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, offset: float) -> np.ndarray:
@@ -47,12 +47,11 @@ def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, off
     scene = MeshScene(vertices, faces)
     normals = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, np.float32)
     starts, seen = vertices + offset * normals, np.zeros(len(vertices), bool)
-    limits = cameras.size.flip(0)
-    for pose, lens in zip(cameras.poses, cameras.intrinsics):
+    for pose, lens, size in zip(*cameras):
         places = torch.from_numpy(starts[~seen]) - pose[:3, 3]
         in_camera = places @ pose[:3, :3]
         at = projected(in_camera, lens)
-        in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < limits).all(1)
+        in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < size.flip(0)).all(1)
         to_camera = -places / places.norm(dim=1, keepdim=True)
         in_front = (to_camera.numpy() * normals[~seen]).sum(1) > GRAZING
         rows = np.flatnonzero(in_frame.numpy() & in_front)

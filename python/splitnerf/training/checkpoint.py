@@ -189,7 +189,7 @@ def _check_cameras(cameras: object) -> None:
         raise ValueError("cameras are missing or of another type")
     check_tensor("cameras' poses", cameras["poses"], (-1, 4, 4), torch.float32)
     check_tensor("cameras' intrinsics", cameras["intrinsics"], (len(cameras["poses"]), 4), torch.float32)
-    check_tensor("cameras' size", cameras["size"], (2,), torch.int64)
+    check_tensor("cameras' sizes", cameras["sizes"], (len(cameras["poses"]), 2), torch.int64)
 
 
 def _check_light(config: Config, content: dict) -> None:

@@ -85,7 +85,6 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         photos = _photographs(source, out, settings, report)
         _begin(work, photos, settings)
         kept, left_out = _sorted_out(photos, report)
-        _check_sizes(kept)
         images = _upright_copies(kept, work)
         found = reconstruct(kept, images, work, settings.seed, report)
         left_out |= _without_camera(kept, found.names, source)
@@ -133,14 +132,6 @@ def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) 
         elif s < BLURRED * np.median(sharp):
             reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
     return [photo for photo in photos if photo.name not in reasons], reasons
-
-
-def _check_sizes(photos: list[Photograph]) -> None:
-    """Raises InputError where photos are of different sizes, which training does not take."""
-    for photo in photos:
-        if (photo.width, photo.height) != (photos[0].width, photos[0].height):
-            sizes = [f"{p.path.name} is {p.width}x{p.height}" for p in (photos[0], photo)]
-            raise InputError(f"{photo.path.parent}: {sizes[0]}, {sizes[1]}; give photos of one size")
 
 
 def _upright_copies(photos: list[Photograph], work: Path) -> Path:

@@ -87,8 +87,9 @@ def _layout(train: Dataset, test: Dataset | None, reading: Reading) -> Finding:
 
 
 def _sizes(train: Dataset, test: Dataset | None) -> Finding:
-    sizes = {f"{split.width} x {split.height}" for split in (train, test) if split is not None}
-    across = np.degrees(2 * np.arctan(0.5 * train.width / train.intrinsics[:, 0]))
+    splits = [split for split in (train, test) if split is not None]
+    sizes = {f"{width} x {height}" for split in splits for height, width in split.sizes.tolist()}
+    across = np.degrees(2 * np.arctan(0.5 * train.sizes[:, 1] / train.intrinsics[:, 0]))
     reduced = f", averaged down by {train.downscale}" if train.downscale > 1 else ""
     return Finding("size", f"{' and '.join(sorted(sizes))} pixels{reduced}, {_range(across, '.0f')} degrees across")
 

@@ -49,7 +49,7 @@ def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tenso
 @torch.no_grad()
 def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
     """[n, 3] the points that the photos show, scene units: where half of a ray's light is gone."""
-    return np.concatenate([_points(field, *view_rays(dataset, i, _size(dataset, POINTS))) for i in range(len(dataset))])
+    return np.concatenate([_points(field, *view_rays(dataset, i, _size(dataset, i, POINTS))) for i in range(len(dataset))])
 
 
 @torch.no_grad()
@@ -60,25 +60,27 @@ def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple
     cells = region.centres() - middle
     reach = float((cells - (cells @ normal)[:, None] * normal).norm(dim=1).max()) + AROUND
     centre = middle - (middle @ normal - table.offset) * normal
-    points, colours, size = [], [], _size(dataset, DENSE)
+    points, colours = [], []
     axes = torch.from_numpy(dataset.poses[:, :3, 2])
     steep = min(STEEP, 0.7 * float((axes @ normal).median()))
     for i in range(len(dataset)):
+        size = _size(dataset, i, DENSE)
         rays_o, rays_d = view_rays(dataset, i, size)
         down = (rays_d @ normal).clamp(max=-1e-6)
         meets = rays_o + ((table.offset - rays_o @ normal) / down)[:, None] * rays_d
         near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < -steep)
         points.append(_points(field, rays_o[near], rays_d[near]))
-        rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, (dataset.height, dataset.width)))
+        rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, dataset.sizes[i].tolist()))
         photo = torch.from_numpy(np.asarray(dataset.images[i, ..., :3]))[rows][:, columns].reshape(-1, 3)
         colours.append(photo[near].numpy())
     return np.concatenate(points), np.concatenate(colours)
 
 
-def _size(dataset: Dataset, n: int) -> tuple[int, int]:
-    """The height and width of an image of about n pixels, or of the photos where these have fewer."""
-    stride = max(1.0, math.sqrt(dataset.height * dataset.width / n))
-    return max(1, round(dataset.height / stride)), max(1, round(dataset.width / stride))
+def _size(dataset: Dataset, index: int, n: int) -> tuple[int, int]:
+    """The height and width of an image of about n pixels of a view, or of its photo where that has fewer."""
+    height, width = dataset.sizes[index].tolist()
+    stride = max(1.0, math.sqrt(height * width / n))
+    return max(1, round(height / stride)), max(1, round(width / stride))
 
 
 def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
@@ -96,8 +98,8 @@ def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
 def view_rays(dataset: Dataset, index: int, size: tuple[int, int]) -> tuple[Tensor, Tensor]:
     """The rays of a view through the pixels of an image of it with another height and width, see
     :func:`splitnerf.render.rays.image_rays`."""
-    height, width = size
-    scale = torch.tensor([width / dataset.width, height / dataset.height] * 2)
+    (height, width), whole = size, dataset.sizes[index].tolist()
+    scale = torch.tensor([width / whole[1], height / whole[0]] * 2)
     pose, intrinsics = (torch.from_numpy(x[index]) for x in (dataset.poses, dataset.intrinsics))
     return image_rays(pose, intrinsics * scale, height, width)
 
@@ -105,10 +107,9 @@ def view_rays(dataset: Dataset, index: int, size: tuple[int, int]) -> tuple[Tens
 @torch.no_grad()
 def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int) -> np.ndarray:
     """[h, w] the coverage of a view by the object, in [0, 1]: first coarsely, then fully where it changes."""
-    shrink = max(1.0, max(dataset.height, dataset.width) / LONGEST)
-    size, small = (
-        (max(1, round(dataset.height / factor)), max(1, round(dataset.width / factor))) for factor in (shrink, shrink * COARSER)
-    )
+    whole = dataset.sizes[index].tolist()
+    shrink = max(1.0, max(whole) / LONGEST)
+    size, small = (tuple(max(1, round(n / factor)) for n in whole) for factor in (shrink, shrink * COARSER))
     coarse = coverage(field, region, *view_rays(dataset, index, small)).view(1, 1, *small)
     most, least = max_pool2d(coarse, 3, 1, 1), -max_pool2d(-coarse, 3, 1, 1)
     half = -(-size[0] // 2), -(-size[1] // 2)
@@ -119,7 +120,7 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
     if len(chosen):
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
     mask = with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
-    photo = torch.from_numpy(np.asarray(dataset.images[index, ..., :3])).permute(2, 0, 1)
+    photo = torch.from_numpy(dataset.cropped(index, dataset.images[index])[..., :3]).permute(2, 0, 1)
     return at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy())
 
 

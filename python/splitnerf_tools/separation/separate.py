@@ -136,7 +136,7 @@ def write_sheet(dataset: Dataset, folder: Path) -> None:
     rows, chosen = [], spread(range(len(dataset)), SHOWN)
     for i in chosen:
         photo = dataset.images[i, ..., :3]
-        mask = resized_mask(read_image(folder / separated_mask(dataset.image_paths[i])), *photo.shape[:2])
+        mask = dataset.padded(resized_mask(read_image(folder / separated_mask(dataset.image_paths[i])), *dataset.sizes[i]))
         rows.append(photo * (DIMMED + (1 - DIMMED) * mask[..., None]))
     columns = -(-len(rows) // 3)
     rows += [np.zeros_like(rows[0])] * (3 * columns - len(rows))

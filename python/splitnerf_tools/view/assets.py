@@ -201,7 +201,7 @@ class ViewedPhotos:
             raise InputError(f"{root}: no such folder; give the folder of the data that the run was trained on")
         frames, _ = read_frames(root, "train", Reading(eval_mode="all"))
         self._frames = [replace(frame, mask_path=None, dynamic_mask_path=None) for frame in frames]
-        (self.height, self.width), _ = check_files(self._frames, 1)
+        self._sizes = check_files(self._frames, 1)[0].tolist()
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -210,13 +210,12 @@ class ViewedPhotos:
         """For each photo, for JSON: `name`, `pose` (camera-to-world, row by row, OpenGL axes), `intrinsics` (fx, fy,
         cx, cy in pixels of the file), `width`, `height`, and `exposure`, the factor of its linear values that the data
         state."""
-        size = (self.height, self.width)
         return [
             {
                 "name": frame.name, "pose": frame.pose.ravel().tolist(), "intrinsics": lens_intrinsics(frame.lens, size).tolist(),
-                "width": self.width, "height": self.height, "exposure": frame.exposure,
+                "width": size[1], "height": size[0], "exposure": frame.exposure,
             }
-            for frame in self._frames
+            for frame, size in zip(self._frames, self._sizes)
         ]  # fmt: skip
 
     def png(self, number: int) -> bytes:
@@ -225,7 +224,7 @@ class ViewedPhotos:
         Raises:
             InputError: It cannot be read, or is gone.
         """
-        frame, factor = self._frames[number], -(-max(self.height, self.width) // LARGEST)
+        frame, factor = self._frames[number], -(-max(self._sizes[number]) // LARGEST)
         try:
             photo = load_photo(frame, factor, "object")
         except OSError as error:
