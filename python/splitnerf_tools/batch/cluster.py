@@ -7,6 +7,7 @@ import secrets
 import shutil
 import socket
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ GB = 1e9
 TRAINING = TRAINING_GIB * GIB / GB  # GB of memory of a training without its photos
 MEMORY = 4.0  # GB of a scene, photos included
 GPU = 0.25  # of a scene: four at once made a third more steps than one alone on an H100, see docs/cuda.md
-TIMEOUT = 10.0  # seconds for a cluster to answer
+TIMEOUT = 10.0  # seconds for a cluster to answer, and for Ray here to leave its folder
 OBJECT_STORE = 100 << 20  # bytes; results are small
 SHARE_OF_FREE = 0.9  # of the free memory of this machine, for the scenes
 LONGEST_FOLDER = 37  # letters of Ray's folder: its sockets' paths have 64 more, and the system allows 103
@@ -132,7 +133,7 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
             finally:
                 ray.shutdown()
                 if own is not None:
-                    shutil.rmtree(own, ignore_errors=True)
+                    remove_folder(own)
 
 
 def machines_of(ray: ModuleType) -> list[dict[str, float]]:
@@ -161,6 +162,14 @@ def _connect(ray: ModuleType, address: str) -> None:
     except (OSError, ValueError, OverflowError, ray.exceptions.RayError) as error:
         why = plain(str(error).strip()).partition(". ")[0]
         raise InputError(f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`") from None
+
+
+def remove_folder(folder: str) -> None:
+    """Removes Ray's folder; processes of Ray that end may still write into it, for at most some seconds."""
+    until = time.monotonic() + TIMEOUT
+    while os.path.exists(folder) and time.monotonic() < until:
+        shutil.rmtree(folder, ignore_errors=True)
+        time.sleep(0.1)
 
 
 def own_folder() -> str:
