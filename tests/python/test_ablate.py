@@ -12,7 +12,7 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
 from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
-from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table
+from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table, score_of
 from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
@@ -23,7 +23,11 @@ SMALL = [
 
 
 def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
-    return Score("scene", row, seed, relight, 20.0, novel_view, 5.0, 0.1, None, 15.0, 6.0)
+    evaluation = {
+        "relight": relight and {"psnr": relight}, "albedo": {"psnr": 20.0}, "novel_view": {"psnr": novel_view}, "normal_mae_deg": 5.0,
+        "roughness_mae": 0.1, "metallic_balanced_accuracy": None, "light_psnr": 15.0, "seconds": 360.0,
+    }  # fmt: skip
+    return score_of("scene", row, FULL, seed, evaluation)
 
 
 @pytest.mark.parametrize(("name", "n_rows"), [("cpu", 25), ("paper", 8)])
@@ -103,8 +107,9 @@ def test_tables_hold_what_is_known():
     scores = [score(FULL, 0, 30.0), score("b", 0, None)]
     rows = list(csv.DictReader(csv_table(scores).splitlines()))
     assert rows[0]["relight"] == "30.0" and rows[1]["relight"] == "" and rows[0]["metallic"] == ""
+    assert rows[0]["minutes"] == "6.0" and rows[0]["normals"] == "5.0" and rows[0]["reference"] == FULL
     text = markdown_table([score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0)])
-    assert "| full | 30.50 | 20.00 | 30.00 |" in text and "| b | 29.00 |" in text and "| -1.00 dB | full |" in text
+    assert "| full | 30.50 | 20.00 | 30.00 | 5.00 | 0.100 | - | 15.00 | 6.0 | 2 |" in text and "| b | 29.00 |" in text and "| -1.00 dB | full |" in text
 
 
 def test_it_runs_and_goes_on(tmp_path, capsys):

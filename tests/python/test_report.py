@@ -257,9 +257,6 @@ def test_a_glb_that_does_not_fit_or_cannot_be_read_is_said(tmp_path, glb, monkey
     assert "<h2>Object</h2>" not in write(tmp_path, asset=tmp_path / "none.glb")[0]
 
 
-# ---- the script ----
-
-
 def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):
     def replace_unless_page(source, target, replace=os.replace):
         if Path(target).suffix == ".html":

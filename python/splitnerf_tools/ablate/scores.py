@@ -5,41 +5,35 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from splitnerf_tools.ablate.rows import FULL
 
 CLOSE = 0.3  # dB: a smaller difference of single runs is not significant
+# Name, title, format, and keys in evaluation.json.
 COLUMNS = (
-    ("relight", "relight, dB", "{:.2f}"),
-    ("albedo", "albedo, dB", "{:.2f}"),
-    ("novel_view", "novel view, dB", "{:.2f}"),
-    ("normals", "normals, degrees", "{:.2f}"),
-    ("roughness", "roughness, error", "{:.3f}"),
-    ("metallic", "metallic, accuracy", "{:.3f}"),
-    ("light", "light, dB", "{:.2f}"),
-    ("minutes", "time, min", "{:.1f}"),
+    ("relight", "relight, dB", "{:.2f}", ("relight", "psnr")),
+    ("albedo", "albedo, dB", "{:.2f}", ("albedo", "psnr")),
+    ("novel_view", "novel view, dB", "{:.2f}", ("novel_view", "psnr")),
+    ("normals", "normals, degrees", "{:.2f}", ("normal_mae_deg",)),
+    ("roughness", "roughness, error", "{:.3f}", ("roughness_mae",)),
+    ("metallic", "metallic, accuracy", "{:.3f}", ("metallic_balanced_accuracy",)),
+    ("light", "light, dB", "{:.2f}", ("light_psnr",)),
+    ("minutes", "time, min", "{:.1f}", ("seconds",)),
 )
 
 
 @dataclass(frozen=True)
 class Score:
-    """One run's scores, None where the data have no truth; the column titles give the units. `reference` names the row
-    that the run is compared with."""
+    """One run's scores by the names of :data:`COLUMNS`, None where the data have no truth; the titles give the units.
+    `reference` names the row that the run is compared with."""
 
     scene: str
     row: str
     seed: int
-    relight: float | None
-    albedo: float | None
-    novel_view: float | None
-    normals: float | None
-    roughness: float | None
-    metallic: float | None
-    light: float | None
-    minutes: float | None
+    values: dict[str, float | None]
     reference: str = FULL
 
 
@@ -65,15 +59,18 @@ class Difference:
         return f"no difference ({text})" if abs(self.mean) < 2 * self.error else text
 
 
+def value_at(evaluation: object, keys: Sequence[str]) -> float | None:
+    """A number of an evaluation.json by its keys; None where there is none."""
+    for key in keys:
+        evaluation = evaluation.get(key) if isinstance(evaluation, dict) else None
+    return float(evaluation) if isinstance(evaluation, (int, float)) else None
+
+
 def score_of(scene: str, row: str, reference: str, seed: int, evaluation: dict) -> Score:
     """The columns of an evaluation.json."""
-    psnr = {key: (evaluation.get(key) or {}).get("psnr") for key in ("relight", "albedo", "novel_view")}
-    seconds = evaluation.get("seconds")
-    return Score(
-        scene, row, seed, **psnr, normals=evaluation["normal_mae_deg"], roughness=evaluation["roughness_mae"],
-        metallic=evaluation["metallic_balanced_accuracy"], light=evaluation["light_psnr"],
-        minutes=None if seconds is None else seconds / 60, reference=reference,
-    )  # fmt: skip
+    values = {name: value_at(evaluation, keys) for name, _, _, keys in COLUMNS}
+    seconds = values["minutes"]
+    return Score(scene, row, seed, values | {"minutes": None if seconds is None else seconds / 60}, reference)
 
 
 def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
@@ -91,15 +88,16 @@ def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
 
 
 def _judged(score: Score) -> float:
-    return score.novel_view if score.relight is None else score.relight
+    return score.values["novel_view"] if score.values["relight"] is None else score.values["relight"]
 
 
 def csv_table(scores: Sequence[Score]) -> str:
     """A line per run."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(Score.__dataclass_fields__), lineterminator="\n")
+    names = ["scene", "row", "seed", *(name for name, *_ in COLUMNS), "reference"]
+    writer = csv.DictWriter(text, names, lineterminator="\n", extrasaction="ignore")
     writer.writeheader()
-    writer.writerows({k: "" if v is None else v for k, v in asdict(s).items()} for s in scores)
+    writer.writerows(vars(s) | s.values for s in scores)
     return text.getvalue()
 
 
@@ -108,11 +106,11 @@ def markdown_table(scores: Sequence[Score]) -> str:
     parts = []
     for scene in dict.fromkeys(s.scene for s in scores):
         verdicts = {d.row: d.verdict() for d in differences(scores, scene)}
-        lines = [["", *(title for _, title, _ in COLUMNS), "seeds", "difference", "to"]]
+        lines = [["", *(title for _, title, *_ in COLUMNS), "seeds", "difference", "to"]]
         lines.append(["---"] + ["---:"] * (len(COLUMNS) + 2) + ["---"])
         for name in dict.fromkeys(s.row for s in scores if s.scene == scene):
             runs = [s for s in scores if s.scene == scene and s.row == name]
-            cells = [_mean([getattr(s, key) for s in runs], text) for key, _, text in COLUMNS]
+            cells = [_mean([s.values[key] for s in runs], text) for key, _, text, _ in COLUMNS]
             lines.append(
                 [name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference]
             )

@@ -11,6 +11,7 @@ from pathlib import Path
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError, plain
 from splitnerf.files import atomic_path
+from splitnerf_tools.ablate.scores import value_at
 
 STATE, TABLE, LOGS = "batch.json", "batch.md", "logs"  # in the batch's folder, beside the runs
 FORMAT = 1
@@ -56,11 +57,8 @@ class Scene:
         except InputError:
             return
         for title, keys, _ in COLUMNS:
-            value = evaluation
-            for key in keys:
-                value = value.get(key) if isinstance(value, dict) else None
-            if isinstance(value, (int, float)):
-                self.scores[title] = float(value)
+            if (value := value_at(evaluation, keys)) is not None:
+                self.scores[title] = value
         self.minutes = evaluation.get("seconds", 60 * self.minutes) / 60
 
     def cells(self) -> list[str]:

@@ -146,8 +146,6 @@ class Live:
         self.shown.frame = source.asset
         self.shown.sources[0] = replace(source, version=self.shown.sources[0].version + 1)
 
-    # ----
-
     def _frame(self, world_from_box: np.ndarray) -> None:
         """The first camera has the whole ball of radius 1 in view, in which normalisation puts the object."""
         corners = np.concatenate([np.eye(3), -np.eye(3)]).astype(np.float32)
