@@ -289,7 +289,7 @@ REFUSED = [
     ("cameras are missing", put(cameras=None)),
     ("cameras are missing", drop("cameras", "intrinsics")),
     ("cameras' intrinsics", lambda c: put("cameras", poses=torch.cat(2 * [c["cameras"]["poses"]]))(c)),
-    ("cameras' size", put("cameras", size=torch.ones(3).long())),
+    ("cameras' sizes", put("cameras", sizes=torch.ones(3).long())),
     ("start has no surface", put(start={"distance": torch.full((16, 16, 16), 2.0), "trust": torch.ones(16, 16, 16)})),
     # the mesh
     ("mesh_faces is missing", mesh(mesh_faces=None)),
