@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export import surface
-from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
+from splitnerf.export.bake import Spread, UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
 from splitnerf.export.textured import textured_asset
@@ -156,6 +156,12 @@ def test_charts_are_small_and_fill_a_large_texture():
     _, chart = connected_components(graph, directed=False)
     assert np.bincount(chart[faces[:, 0]], ball.area_faces).max() < 2 * ball.area / 64
     assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
+
+
+def test_what_lies_outside_takes_the_nearest_value():
+    image = Spread(np.array([0, 15]), 4)(np.array([[1.0, 2.0], [3.0, 4.0]]))
+    assert image.dtype == np.float32 and image.shape == (4, 4, 2)
+    assert image[1, 1].tolist() == [1, 2] and image[2, 3].tolist() == [3, 4]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

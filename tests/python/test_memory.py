@@ -49,6 +49,11 @@ def test_codes_stand_for_the_values_they_are_rounded_from(dtype, most):
     assert np.abs(decoded(encoded(values, dtype)) - values).max() < 0.5001 / most
 
 
+def test_bytes_become_words_exactly():
+    codes = np.arange(256).astype(np.uint8)
+    assert np.allclose(decoded(encoded(codes, np.uint16)), codes / 255, atol=1e-7)
+
+
 def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
     """Equal bits of the pixels, of the fingerprint, and of what some steps learn."""
     reading, folder = in_file
