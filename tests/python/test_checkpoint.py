@@ -103,6 +103,9 @@ DAMAGED = {
         lambda path: repack(path, lambda pickled: pickled + bytes(LONGEST_PICKLE + 1 - len(pickled))), "its pickle is too long",
     ),
     "no file": (Path.unlink, "no checkpoint there"),
+    "another format": (
+        lambda path: torch.save(torch.load(path, weights_only=True) | {"format": 2}, path), "format 2, this version reads 1",
+    ),
 }  # fmt: skip
 
 
@@ -119,11 +122,6 @@ def test_a_damaged_file_is_refused_and_calls_nothing(path, monkeypatch, case):
 def test_a_pickle_may_be_as_long_as_is_allowed(path):
     repack(path, lambda pickled: pickled + bytes(LONGEST_PICKLE - len(pickled)))
     assert load_checkpoint(path)["step"] == 2
-
-
-def test_another_format_is_refused(content, tmp_path):
-    with pytest.raises(InputError, match="checkpoint format 2, this version reads 1"):
-        stored(content | {"format": 2}, tmp_path)
 
 
 def test_the_unpickler_calls_nothing_by_itself(tmp_path, monkeypatch):

@@ -26,9 +26,6 @@ def read(cache: VisibilityCache, x: torch.Tensor, n: torch.Tensor, *, light=None
     return cached_occlusion(cache, x, n, n, torch.ones(len(x), 1), light, radiance)
 
 
-# ---- the bits ----
-
-
 def test_bits_and_hits_are_those_of_single_rays():
     sphere, box = trimesh.creation.icosphere(2), trimesh.creation.box((0.8, 1.2, 0.5))
     mesh = trimesh.util.concatenate([sphere.apply_translation((-0.9, 0, 0)), box.apply_translation((0.6, 0.2, -0.1))])
@@ -53,9 +50,6 @@ def test_bits_and_hits_are_those_of_single_rays():
     assert np.array_equal(hits.reshape(-1)[blocked].numpy(), heaviest)
 
 
-# ---- closed forms ----
-
-
 @pytest.mark.parametrize("height", [1.3, 2.0, 3.0])
 def test_under_a_sphere(height):
     """A unit sphere straight above hides sin^2 of its half angle of the cosine-weighted hemisphere."""
@@ -67,9 +61,6 @@ def test_under_a_sphere(height):
         expected = 1 - 1 / (height - OFFSET) ** 2
         assert abs(o_d[0, 0].item() - expected) < 0.01
         torch.testing.assert_close(o_s, o_d, rtol=0, atol=1e-5)  # the lobe of roughness 1 about n is the cosine's
-
-
-# ---- indirect light ----
 
 
 def half_shell(subdivisions: int) -> trimesh.Trimesh:
