@@ -20,6 +20,12 @@ def test_fibonacci_directions_are_uniform_and_seeded():
     assert not torch.equal(directions, fibonacci_directions(4096, generator(6), torch.float64))
 
 
+def test_the_seed_decides_the_samples_of_a_lobe():
+    axes, roughness = torch.tensor([[0.0, 0.0, 1.0]]), torch.tensor([[0.5]])
+    first, again, other = (sample_ggx_lobe(axes, roughness, 8, seed) for seed in (1, 1, 2))
+    assert torch.equal(first, again) and not torch.equal(first, other)
+
+
 # ---- gbar against a million samples of the lobe ----
 
 
