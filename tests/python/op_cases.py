@@ -251,12 +251,7 @@ def sparse_inputs(dtype) -> tuple:
 def interpolation(dtype) -> tuple:
     first = torch.tensor([0, 0, 1, 2, 2, 4])
     share = torch.rand(6, generator=generator(), dtype=torch.float64).to(dtype)
-    return (
-        torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype),
-        first,
-        first.clamp(max=3) + 1,
-        share,
-    )
+    return torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype), first, first.clamp(max=3) + 1, share
 
 
 def interpolation_backward(dtype) -> tuple:
@@ -333,11 +328,8 @@ ON_THE_CPU_ALONE = {
 }
 EVERY = CASES | ON_THE_CPU_ALONE
 
-
 # Which samples there are depends on roundings: the truth is the CPU's own in the same dtype.
 ROUNDED_ALIKE = {"march_rays", "spread_samples", "sample_rays"}
-
-
 STAY_ON_THE_CPU = {"light_lookup": (4, 5), "light_lookup_backward": (4, 5)}  # resolutions and nodes
 
 
