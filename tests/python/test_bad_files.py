@@ -179,7 +179,7 @@ COLMAP = {
     "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
     "no focal length": (cameras({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'fl_x' must be"),
     "NaN": (cameras({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'k1' is no coefficient"),
-    "missing image": (lambda root: (root / "images/v05.png").unlink(), r"v05.png: no such image, though images.* lists it"),
+    "missing image": (lambda root: (root / "images/v05.png").unlink(), r"v05.png: no such image, with or without a suffix, though images.* lists it"),
 }  # fmt: skip
 POINTS = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1  # where the first image's number of points stands
 

@@ -29,8 +29,8 @@ from splitnerf.training.losses import SeenLight
 from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.photometry import find_exposures
 from splitnerf_tools.capture.prepare import PrepareSettings, _begin, _upright_copies, _without_camera
-from splitnerf_tools.capture.masks import dots_of, given_masks
-from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_frames, write_png
+from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
+from splitnerf_tools.capture.photographs import Photograph, find_photographs, read_upright, sharpness, write_frames, write_png
 from splitnerf_tools.capture.poses import Lens, Reconstruction
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -189,13 +189,18 @@ def test_dots_of_the_points_that_a_photo_shows():
 def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
     world, truth = seen_world()
     for name, ball in zip(world.scene.names, truth):
-        Image.fromarray(np.where(ball ^ inverted, 255, 0).astype(np.uint8)).save(tmp_path / f"{name}.png")
-    masks = given_masks(world, tmp_path, 0)
+        Image.fromarray(np.where(ball ^ inverted, 255, 0).astype(np.uint8)).save(tmp_path / f"{name}.MP.png")
+    (tmp_path / "._p_00.MP.png").write_bytes(b"a Mac's")
+    photos = [Photograph(tmp_path / f"{name}.MP.jpg", name, 320, 240, None, "", None) for name in world.scene.names]
+    masks = given_masks(world, mask_files(photos, tmp_path), tmp_path, 0)
     assert all((mask == ball).mean() > 0.999 for mask, ball in zip(masks, truth))
     assert ("turned around" in capsys.readouterr().err) == inverted
-    (tmp_path / f"{world.scene.names[3]}.png").unlink()
-    with pytest.raises(InputError, match="has no mask p_03.png"):
-        given_masks(world, tmp_path, 0)
+    Image.new("L", (240, 320)).save(tmp_path / "p_03.MP.png")
+    with pytest.raises(InputError, match="p_03.MP.png: is 240x320, its photo 320x240; make them equal"):
+        mask_files(photos, tmp_path)
+    (tmp_path / "p_03.MP.png").unlink()
+    with pytest.raises(InputError, match="has no mask p_03.MP.png"):
+        mask_files(photos, tmp_path)
 
 
 def test_sigterm_ends_it_without_a_stack_trace(tmp_path):
@@ -368,7 +373,7 @@ def test_data_whose_masks_are_not_found_are_not_left(tmp_path, monkeypatch):
     exposures = find_exposures(*[np.zeros(0, int)] * 2, *[np.zeros(0)] * 2, np.ones(len(world.scene.names)))
     photos = {name: SimpleNamespace(path=tmp_path) for name in world.scene.names}
     with pytest.raises(InputError, match="nothing stands out"):
-        preparation.write_data(world, exposures, photos, tmp_path, PrepareSettings(), lambda step, share: None)
+        preparation.write_data(world, exposures, photos, None, tmp_path, PrepareSettings(), lambda step, share: None)
     assert not (tmp_path / "transforms.json").exists()
 
 

@@ -71,7 +71,7 @@ def test_the_largest_of_several_models_is_read(tmp_path, capsys):
     (tmp_path / "sparse/0/cameras.bin").write_bytes(struct.pack("<Q", 0))
     (tmp_path / "sparse/0/images.bin").write_bytes(struct.pack("<Q", 0))
     assert len(load_dataset(tmp_path)) == COUNT - 2
-    assert f"{tmp_path}: has 2 COLMAP models; the largest is read" in capsys.readouterr().err
+    assert f"{tmp_path}: has 2 COLMAP models; the one with the most images is read" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("binary", [True, False])

@@ -206,7 +206,7 @@ class TestReading:
         masks = write_ball_on_floor(tmp_path / "data", 8, alpha=alpha)
         for i, mask in enumerate(masks):
             small = mask.reshape(SIZE // 2, 2, SIZE // 2, 2).mean((1, 3))
-            write_image(tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png"), small)
+            write_image(tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png", tmp_path / "data"), small)
         photos = load_dataset(tmp_path / "data", reading=Reading("all", separated=tmp_path / "found"))
         assert photos.masked
         agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
@@ -224,7 +224,7 @@ def test_masks_of_odd_sizes(tmp_path, size):
 
 def overlap(run, masks: list[np.ndarray]) -> float:
     """The mean intersection over union of a run's found masks with the true ones."""
-    found = [read_image(run / SEPARATED / f"images_p{i}.png")[..., 0] > 0.5 for i in range(len(masks))]
+    found = [read_image(run / SEPARATED / f"images/p{i}.png")[..., 0] > 0.5 for i in range(len(masks))]
     return float(np.mean([(a & b).sum() / (a | b).sum() for a, b in zip(found, masks)]))
 
 
@@ -239,7 +239,7 @@ def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     assert floor.shape[1:] == (128, 4) and floor[..., 1].mean() > 2 * floor[..., 0].mean() and floor[..., 3].mean() > 0.6
     assert "above a table" in capsys.readouterr().err
     assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 0
-    (run / SEPARATED / "images_p0.png").write_bytes(b"")
+    (run / SEPARATED / "images/p0.png").write_bytes(b"")
     again = "--eval-mode", "all", "--steps", "30", "--overwrite"
     assert train(tmp_path / "data", run, *again) == 0 and overlap(run, masks) > 0.9  # found anew
     (run / SEPARATED / "separation.json").unlink()

@@ -298,7 +298,8 @@ def dataset_fingerprint(dataset: Dataset) -> str:
 
 def spread(items: Sequence, count: int) -> list:
     """At most `count` of the items, evenly spread."""
-    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
+    chosen = np.unique(np.linspace(0, len(items) - 1, count).round().astype(int)) if len(items) else []
+    return [items[i] for i in chosen]
 
 
 class _Contradiction(InputError):

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import shutil
 import struct
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
 import torch
-from PIL import Image
+from PIL import Image, ImageCms
 from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path, is_file
+from splitnerf.notes import note_once
 
 JPEG_QUALITY = 95
 SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it
@@ -54,6 +57,58 @@ def read_codes(path: str | os.PathLike) -> np.ndarray:
     return _read(Path(path), str(path), as_stored=True)
 
 
+def read_colours(path: str | os.PathLike) -> np.ndarray:
+    """Reads a photo like `read_codes`, and brings the colours of 8- and 16-bit files to sRGB from the colour profile or the
+    gamma that the file states. A note says what it states and cannot be used, and that its orientation is not."""
+    path = Path(path)
+    with _opened(path, str(path)) as (source, spec):
+        stated = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    pixels = read_codes(path)
+    if stated.get("Orientation", 1) != 1:
+        turned = f"{path.name}: {stated['Orientation']}"
+        note_once(f"{path.parent}: photos state an EXIF orientation; their pixels are used as they are stored", turned)
+    if pixels.dtype.kind == "f":
+        return pixels
+    n_colours = 3 if pixels.shape[2] >= 3 else 1
+    if "ICCProfile" in stated:
+        profile = bytes(np.asarray(stated["ICCProfile"], np.uint8))
+        pixels[..., :n_colours] = from_profile(pixels[..., :n_colours], profile, path)
+    elif (gamma := _stated_gamma(str(stated.get("oiio:ColorSpace", "")))) != 0:
+        most = np.iinfo(pixels.dtype).max
+        curve = linear_to_srgb((np.arange(most + 1, dtype=np.float32) / most) ** np.float32(gamma))
+        pixels[..., :n_colours] = np.rint(most * curve).astype(pixels.dtype)[pixels[..., :n_colours]]
+        note_once(f"{path.parent}: photos state the gamma {gamma:g}; they are brought to sRGB", path.name)
+    return pixels
+
+
+def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
+    """Colours [H, W, 1 or 3] of a photo with an ICC profile, as sRGB; as they are, with a note, where that cannot be done."""
+    try:
+        source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        name = ImageCms.getProfileDescription(source).strip()
+        if "srgb" in name.lower() or "iec61966" in name.lower():
+            return colours
+        if colours.shape[2] != 3 or colours.dtype != np.uint8:
+            raise ValueError("only photos of 8 bits and three channels are converted")
+        image, target = Image.fromarray(np.ascontiguousarray(colours)), ImageCms.createProfile("sRGB")
+        intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
+        converted = ImageCms.profileToProfile(image, source, target, intent, outputMode="RGB")
+    except (ImageCms.PyCMSError, OSError, ValueError) as error:
+        note_once(f"{path.parent}: the colour profile of photos is not used, as {error}; convert them to sRGB", path.name)
+        return colours
+    note_once(f"{path.parent}: photos have the colour profile {name}; they are converted to sRGB", path.name)
+    return np.asarray(converted)
+
+
+def _stated_gamma(space: str) -> float:
+    """The gamma of a colour space's name in OpenImageIO's words; 0 for sRGB's curve and those that differ little from it."""
+    if space.startswith("lin"):
+        return 1.0
+    found = re.match(r"g(\d+)_", space)
+    gamma = float(found[1]) / 10 if found else 0.0
+    return 0.0 if 2.0 < gamma < 2.4 else gamma
+
+
 class Header(NamedTuple):
     """What a file says of its image: rows, columns, channels, and bits of a value (32 for floats)."""
 
@@ -65,8 +120,9 @@ class Header(NamedTuple):
 
 def read_header(path: str | os.PathLike) -> Header:
     """What an image file says of itself, without its pixels. Raises InputError as `read_image` does."""
-    with _opened(Path(path), str(path)) as (_, spec):
-        return Header(spec.height, spec.width, spec.nchannels, STORED.get(str(spec.format), 32))
+    with _opened(Path(path), str(path)) as (source, spec):
+        height, width = _window(source, spec)[2:]
+        return Header(height, width, len(_channels(spec)), STORED.get(str(spec.format), 32))
 
 
 def is_written_here(path: Path) -> bool:
@@ -235,7 +291,56 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
         pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
         if pixels is None or source.has_error:
             raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
-    return np.ascontiguousarray(pixels).reshape(spec.height, spec.width, -1)
+        pixels, kept = np.asarray(pixels).reshape(spec.height, spec.width, -1), _channels(spec)
+        if len(kept) < spec.nchannels:
+            others = ", ".join(name for i, name in enumerate(spec.channelnames) if i not in kept)
+            note_once(f"{path.parent}: channels of images are not used: {others}", path.name)
+        top, left, height, width = _window(source, spec)
+        exposure = _exposure(path) if source.format_name() == "hdr" else 1.0
+    pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
+    pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
+    if (top, left, height, width) != (0, 0, *pixels.shape[:2]):
+        whole = np.zeros((height, width, pixels.shape[2]), pixels.dtype)
+        part = pixels[max(0, -top) :, max(0, -left) :][: max(0, height - max(0, top)), : max(0, width - max(0, left))]
+        whole[max(0, top) :, max(0, left) :][: part.shape[0], : part.shape[1]] = part
+        pixels = whole
+    return np.ascontiguousarray(pixels)
+
+
+def _channels(spec: oiio.ImageSpec) -> list[int]:
+    """The channels that make an image: R, G, B and A, or Y and A, by their names, of the first layer that has them; all where
+    the names are others."""
+    names = [name.lower() for name in spec.channelnames]
+    layers = ["", *dict.fromkeys(name[: name.rfind(".") + 1] for name in names)]
+    for layer, colours in product(layers, ("rgb", "y")):
+        if all(layer + colour in names for colour in colours):
+            return [names.index(layer + name) for name in f"{colours}a" if layer + name in names]
+    return list(range(spec.nchannels))
+
+
+def _window(source: oiio.ImageInput, spec: oiio.ImageSpec) -> tuple[int, int, int, int]:
+    """Where the pixels lie in the image, and its size: top, left, height, width. An EXR file's pixels may be a part of it."""
+    if source.format_name() != "openexr":
+        return 0, 0, spec.height, spec.width
+    return spec.y - spec.full_y, spec.x - spec.full_x, spec.full_height, spec.full_width
+
+
+def _exposure(path: Path) -> float:
+    """The product of the exposures by which a Radiance file says that its values were multiplied."""
+    with open(path, "rb") as file:
+        head = file.read(1 << 16).split(b"\n\n", 1)[0]
+    factor = 1.0
+    for line in head.splitlines():
+        key, _, value = line.partition(b"=")
+        if key.strip() == b"EXPOSURE":
+            with suppress(ValueError):
+                factor *= float(value)
+        elif key.strip() in (b"PRIMARIES", b"COLORCORR"):
+            note_once(f"{path.parent}: the {key.strip().decode()} of maps are not used", path.name)
+    if not 1e-6 < factor < 1e6:
+        note_once(f"{path.parent}: the EXPOSURE of maps is beyond reason and not used", path.name)
+        return 1.0
+    return factor
 
 
 @contextmanager
@@ -266,6 +371,7 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         size = f"{spec.width}x{spec.height}"
         if min(spec.width, spec.height) < 1 or spec.depth > 1 or n_values > VALUES_PER_BYTE * path.stat().st_size:
             raise InputError(f"{name}: is said to be {size}, too large for its file; replace it")
+        n_values = max(n_values, spec.full_width * spec.full_height * spec.nchannels if spec.full_width > 0 else 0)
         if n_values > LARGEST_IMAGE:
             most = f"the most is {LARGEST_IMAGE // spec.nchannels / 1e6:.0f} megapixels of {spec.nchannels} channels"
             raise InputError(f"{name}: is {size}, {most}; make it smaller")

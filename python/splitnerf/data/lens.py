@@ -77,8 +77,8 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
     """The pinhole and the distortion that the numbers of a file make.
 
     Args:
-        numbers: `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels), `k1 ... k4 p1 p2`, `camera_model` or
-            `is_fisheye`; what is None or missing is not given.
+        numbers: `camera_angle_x camera_angle_y` (radians), `fl_x fl_y cx cy w h` (pixels), `k1 ... k4 p1 p2`, `camera_model`
+            or `is_fisheye`; what is None or missing is not given.
         where: The file, and the frame if it is one's own lens, for messages.
 
     Returns:
@@ -99,12 +99,14 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
     for key, value in coefficients.items():
         if not isinstance(value, (int, float)) or not abs(value) <= LARGEST_COEFFICIENT:
             raise InputError(f"{where}: '{key}' is no coefficient of a lens: {str(value)[:40]}; repair it")
-    if "fl_x" not in numbers and "camera_angle_x" not in numbers:
+    if not numbers.keys() & {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"}:
         raise InputError(f"{where}: missing key 'camera_angle_x' (or 'fl_x'); add it")
     for key, value in numbers.items():
-        valid = isinstance(value, (int, float)) and SMALLEST <= value <= LARGEST
-        if not valid or (key == "camera_angle_x" and value >= np.pi):
-            raise InputError(f"{where}: '{key}' must be a positive number, got {str(value)[:40]}; repair it")
+        placed = key in ("cx", "cy")  # which may lie outside of a crop
+        valid = isinstance(value, (int, float)) and (-LARGEST if placed else SMALLEST) <= value <= LARGEST
+        if not valid or (key.startswith("camera_angle") and value >= np.pi):
+            kind = "number" if placed else "positive number"
+            raise InputError(f"{where}: '{key}' must be a {kind}, got {str(value)[:40]}; repair it")
     fisheye = MODELS[model]
     radial, tangential = (tuple(float(coefficients[key]) for key in keys) for keys in (RADIAL, TANGENTIAL))
     if fisheye and any(tangential):
@@ -129,11 +131,13 @@ def lens_intrinsics(lens: dict, size: tuple[int, int]) -> np.ndarray:
     stated for."""
     height, width = size
     scale_x, scale_y = width / lens.get("w", width), height / lens.get("h", height)
-    if "fl_x" in lens:
-        fx = lens["fl_x"] * scale_x
-        fy = lens.get("fl_y", lens["fl_x"]) * scale_y
-    else:
-        fx = fy = 0.5 * width / np.tan(0.5 * lens["camera_angle_x"])
+    focal = {}
+    for axis, extent, scale in (("x", width, scale_x), ("y", height, scale_y)):
+        if f"fl_{axis}" in lens:
+            focal[axis] = lens[f"fl_{axis}"] * scale
+        elif f"camera_angle_{axis}" in lens:
+            focal[axis] = 0.5 * extent / np.tan(0.5 * lens[f"camera_angle_{axis}"])
+    fx, fy = focal.get("x", focal.get("y")), focal.get("y", focal.get("x"))
     cx = lens["cx"] * scale_x if "cx" in lens else width / 2
     cy = lens["cy"] * scale_y if "cy" in lens else height / 2
     return np.array([fx, fy, cx, cy], dtype=np.float64)

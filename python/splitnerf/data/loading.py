@@ -12,7 +12,7 @@ import numpy as np
 
 from splitnerf.data.images import HDR_SUFFIXES
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.photos import Photo, check_files, load_photo
+from splitnerf.data.photos import Photo, check_files, load_photo, separated_mask
 from splitnerf.data.pixels import GB, Photos, encoded, folder_of_files, forget_pages, new_array, room_for_photos
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -28,7 +28,7 @@ class Loader:
     All sizes are known, and all is estimated, before the first pixel is read.
 
     Args:
-        root: The data's folder, for messages.
+        root: The data's folder.
         frames: The frames.
         downscale: Integer factor of at least 1.
         reading: How the frames are read; its `max_memory` counts the photos that are in memory already.
@@ -45,7 +45,7 @@ class Loader:
     """
 
     def __init__(self, root: Path, frames: Sequence[Frame], downscale: int, reading: Reading, keep: bool = True):
-        self.frames, self.downscale, self.separated = frames, downscale, reading.separated
+        self.root, self.frames, self.downscale, self.separated = root, frames, downscale, reading.separated
         sizes, exact = check_files(frames, downscale)
         height, width = sizes[sizes.prod(axis=1).argmax()].tolist()  # of the largest
         self.sizes = sizes // downscale
@@ -97,7 +97,8 @@ class Loader:
         return Photos(self.codes, self.exposures)
 
     def _load(self, i: int, mask_kind: str) -> Photo:
-        photo = load_photo(self.frames[i], self.downscale, mask_kind, self.separated)
+        found = None if self.separated is None else self.separated / separated_mask(self.frames[i].image_path, self.root)
+        photo = load_photo(self.frames[i], self.downscale, mask_kind, found)
         height, width = self.sizes[i]
         if self.codes is not None:
             self.codes[i, :height, :width] = encoded(photo.rgba, self.codes.dtype)

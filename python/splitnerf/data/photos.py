@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +13,10 @@ from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import NEGATIVE_SHARE
 from splitnerf.data.images import (
-    HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_codes, read_header, read_image,
+    HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_colours, read_header, read_image,
 )  # fmt: skip
 from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.masks import read_mask
 from splitnerf.data.lens import check_shape, lens_intrinsics, undistort
 from splitnerf.data.pixels import averaged_codes, decoded, encoded
 from splitnerf.errors import InputError
@@ -65,7 +67,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         frame: The frame.
         downscale: Integer factor of at least 1.
         mask_kind: "object" or "ignore": what the mask file is where the frame leaves it open.
-        separated: A folder with masks for frames that have none or a full one, named by :func:`separated_mask`; or None.
+        separated: The mask that was found for the image, which counts where the frame has none or a full one; or None.
 
     Raises:
         InputError: A file cannot be used.
@@ -77,11 +79,11 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     alpha, known = pixels[..., -1:] if channels in (2, 4) else None, None
     is_object = (mask_kind if frame.mask_kind == "auto" else frame.mask_kind) == "object"
     if frame.mask_path is not None and is_object:
-        alpha = _read_mask(frame.mask_path)
+        alpha = read_mask(frame.mask_path)
     elif frame.mask_path is not None:
-        known = _read_mask(frame.mask_path) > 0
+        known = read_mask(frame.mask_path) > 0
     if frame.dynamic_mask_path is not None:
-        still = _read_mask(frame.dynamic_mask_path) == 0
+        still = read_mask(frame.dynamic_mask_path) == 0
         known = still if known is None else known & still
     masked = alpha is not None
     alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
@@ -93,7 +95,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
         straight, known = _undistort(decoded(rgba), known, frame, straight=whole)
         rgba = encoded(straight, np.uint16)
     if says_nothing and separated is not None:
-        mask = resized_mask(read_image(separated / separated_mask(frame.image_path)), height, width)
+        mask = resized_mask(read_image(separated), height, width)
         masked, whole, rgba[..., 3] = True, True, encoded(mask, rgba.dtype)
     factor = silhouette_factor(height, width)
     silhouette = area_average(decoded(rgba[..., 3]), factor) > 0.5
@@ -109,9 +111,12 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     return Photo(rgba, known, silhouette & seen, seen, (height, width), masked, whole, scale)
 
 
-def separated_mask(image_path: Path) -> str:
-    """The name of the file with the mask that was found for an image."""
-    return f"{image_path.parent.name}_{image_path.stem}.png"
+def separated_mask(image_path: Path, root: Path) -> Path:
+    """The name of the file with the mask that was found for an image of the data in `root`: that of its path there, as two
+    images may differ in their folders or suffixes alone."""
+    parts = ("up" if part == ".." else part for part in Path(os.path.relpath(image_path, root)).parts)
+    name = Path(*parts)
+    return name if name.suffix == ".png" else name.with_name(f"{name.name}.png")
 
 
 def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
@@ -179,7 +184,7 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
     Raises:
         InputError: Floats are negative, infinite or NaN.
     """
-    pixels = read_codes(path)
+    pixels = read_colours(path)
     n_colours = 3 if pixels.shape[2] >= 3 else 1
     if pixels.dtype.kind != "f":
         if gamma == 0:
@@ -209,14 +214,6 @@ def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
     if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total and pixels.min() >= deepest):
         raise InputError(f"{path}: has NaN, infinite or negative pixels; clean or re-export it")
     return np.maximum(pixels, 0)
-
-
-def _read_mask(path: Path) -> np.ndarray:
-    """[H, W, 1] as it is stored; in [0, 1] if it holds floats. Raises InputError where they are not."""
-    pixels = read_codes(path)
-    if pixels.dtype.kind == "f" and not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
-        raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
-    return pixels[..., :1]
 
 
 def _undistort(

@@ -8,7 +8,8 @@ import numpy as np
 from PIL import Image
 
 from splitnerf.data.environment import sample_environment
-from splitnerf.data.images import LDR_SUFFIXES, over_background, read_image, read_radiance, srgb_to_linear
+from splitnerf.data.images import over_background, read_colours, read_header, read_radiance, srgb_to_linear
+from splitnerf.data.pixels import decoded
 from splitnerf.relight.cameras import View
 
 TRANSPARENT, WHITE, ENVIRONMENT = "transparent", "white", "environment"
@@ -47,14 +48,14 @@ class Background:
 
 
 def read_plate(path: Path) -> np.ndarray:
-    """Reads a background image as [h, w, 3] linear; PNG and JPEG are decoded from sRGB and laid over white.
+    """Reads a background image as [h, w, 3] linear; files of 8 and 16 bits are decoded from sRGB and laid over white.
 
     Raises:
         InputError: It cannot be read.
     """
-    if path.suffix.lower() not in LDR_SUFFIXES:
+    if read_header(path).bits == 32:
         return np.maximum(read_radiance(path), 0)
-    pixels = read_image(path)
+    pixels = decoded(read_colours(path))
     channels = pixels.shape[2]
     srgb = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     return srgb_to_linear(over_background(srgb, pixels[..., -1]) if channels in (2, 4) else srgb)

@@ -6,18 +6,21 @@ they fill the gap below a handle, lose dark undersides and thin rods.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.images import read_header, to_uint8
 from splitnerf.data.layouts.frame import OPENCV_AXES
+from splitnerf.data.masks import read_mask
+from splitnerf.data.pixels import decoded
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note
-from splitnerf_tools.capture.photographs import read_upright
+from splitnerf_tools.capture.photographs import Photograph
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
 from splitnerf_tools.separation.separate import find_object, table_under
@@ -53,24 +56,33 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
     return masks
 
 
-def given_masks(world: World, folder: Path, max_size: int) -> list[np.ndarray]:
-    """[h, w] bool, the masks of a folder as the undistorted photos have them; those that are black on the object are turned
-    around.
+def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
+    """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
 
     Raises:
         InputError: A photo has no mask, or one of another size.
     """
+    stems = {path.stem: path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith("._")}
+    found = {}
+    for photo in photos:
+        path = stems.get(photo.path.name, stems.get(photo.path.stem))
+        if path is None:
+            raise InputError(f"{folder}: has no mask {photo.path.stem}.png; add it or leave --masks out")
+        height, width, *_ = read_header(path)
+        if (width, height) != (photo.width, photo.height):
+            raise InputError(f"{path}: is {width}x{height}, its photo {photo.width}x{photo.height}; make them equal")
+        found[photo.name] = path
+    return found
+
+
+def given_masks(world: World, files: Mapping[str, Path], folder: Path, max_size: int) -> list[np.ndarray]:
+    """[h, w] bool, the masks of files by the photos' names, as the undistorted photos have them; those that are black on the
+    object are turned around."""
     scene, masks, score = world.scene, [], 0.0
     for i, name in enumerate(scene.names):
         lens = scene.lenses[i]
-        found = [path for path in sorted(folder.iterdir()) if path.name.split(".")[0] == name]
-        if not found:
-            raise InputError(f"{folder}: has no mask {name}.png; add it or leave --masks out")
-        mask = read_upright(found[0])[..., 0]
-        if mask.shape != (lens.height, lens.width):
-            size = f"{mask.shape[1]}x{mask.shape[0]}"
-            raise InputError(f"{found[0]}: is {size}, its photo {lens.width}x{lens.height}; make them equal")
-        masks.append(undistort(mask, lens, pinhole_of(lens, max_size)) > np.iinfo(mask.dtype).max / 2)
+        mask = to_uint8(decoded(read_mask(files[name])))[..., 0]
+        masks.append(undistort(mask, lens, pinhole_of(lens, max_size)) > 127)
         of_object, others = dots_of(world, i, max_size)
         for dots, sign in ((of_object, 1), (others, -1)):
             row, column = dots[:, ::-1].astype(int).clip(0, np.array(masks[-1].shape) - 1).T

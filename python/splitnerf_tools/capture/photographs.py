@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
 
+from splitnerf.data.images import from_profile
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
 
@@ -54,7 +55,10 @@ def find_photographs(folder: Path) -> list[Photograph]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give the folder with the photos")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in COMMON + HEIC + RAW and path.is_file())
+    paths = sorted(
+        path for path in folder.iterdir()
+        if path.suffix.lower() in COMMON + HEIC + RAW and path.is_file() and not path.name.startswith("._")  # a Mac's
+    )
     if not paths:
         raise InputError(f"{folder}: holds no photos ({', '.join(COMMON + HEIC + RAW)}); give the folder with the photos")
     seen: dict[str, Path] = {}
@@ -79,7 +83,11 @@ def read_upright(path: Path) -> np.ndarray:
         with rawpy.imread(str(path)) as raw:
             return raw.postprocess(gamma=(2.4, 12.92), no_auto_bright=True, use_camera_wb=True, output_bps=16)
     with _open(path) as image:
-        return np.asarray(ImageOps.exif_transpose(image).convert("RGB"))
+        upright, profile = ImageOps.exif_transpose(image), image.info.get("icc_profile")
+        if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
+            return np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
+        pixels = np.asarray(upright.convert("RGB"))
+    return from_profile(pixels, profile, path) if profile else pixels
 
 
 def is_upright(photo: Photograph) -> bool:

@@ -20,7 +20,7 @@ from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, locked, remove_partial
 from splitnerf.notes import note
 from splitnerf_tools.capture.photometry import Exposures, find_exposures
-from splitnerf_tools.capture.masks import find_masks, given_masks
+from splitnerf_tools.capture.masks import find_masks, given_masks, mask_files
 from splitnerf_tools.capture.page import write_page
 from splitnerf_tools.capture.photographs import (
     VIDEO, Photograph, find_photographs, is_upright, read_upright, sharpness, write_frames, write_png,
@@ -83,6 +83,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         raise InputError(f"{out}: holds other files; give a new folder")
     with locked(out):
         photos = _photographs(source, out, settings, report)
+        masks = None if settings.masks is None else mask_files(photos, settings.masks)
         _begin(work, photos, settings)
         kept, left_out = _sorted_out(photos, report)
         images = _upright_copies(kept, work)
@@ -91,7 +92,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         world = settle(found, settings.seed)
         by_name = {photo.name: photo for photo in kept}
         exposures = exposures_of(world.scene, by_name, report)
-        shares = write_data(world, exposures, by_name, out, settings, report)
+        shares = write_data(world, exposures, by_name, masks, out, settings, report)
         write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
     return Prepared(world, exposures, left_out, shares)
 
@@ -187,8 +188,8 @@ def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: 
 
 
 def write_data(
-    world: World, exposures: Exposures, by_name: dict[str, Photograph], out: Path, settings: PrepareSettings,
-    report: Callable[[str, float], None],
+    world: World, exposures: Exposures, by_name: dict[str, Photograph], mask_of: dict[str, Path] | None, out: Path,
+    settings: PrepareSettings, report: Callable[[str, float], None],
 ) -> np.ndarray:  # fmt: skip
     """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
@@ -198,7 +199,7 @@ def write_data(
         photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
         write_png(out / "images" / f"{name}.png", undistort(photo, scene.lenses[i], pinhole))
         report("images", (i + 1) / len(scene.names))
-    if settings.masks is None:
+    if mask_of is None:
         _write_transforms(world, exposures, pinholes, out, masked=False)
         try:
             masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
@@ -206,7 +207,7 @@ def write_data(
             (out / TRANSFORMS).unlink()  # data without their masks are half of the data
             raise
     else:
-        masks = given_masks(world, settings.masks, settings.max_size)
+        masks = given_masks(world, mask_of, settings.masks, settings.max_size)
     for name, pinhole, mask in zip(scene.names, pinholes, masks):
         small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
         write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))

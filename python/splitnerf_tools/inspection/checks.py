@@ -68,6 +68,7 @@ def inspect(train: Dataset, test: Dataset | None, reading: Reading) -> Inspectio
         _sizes(train, test),
         _distances(views, fit, train.box_from_world),
         _directions(azimuth, elevation),
+        _upward(upward),
         _inside(views, fit),
         _shares(views),
         _cut(views),
@@ -109,6 +110,13 @@ def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> Finding:
         sector = f"{begin:.0f} to {(begin + gap + 180) % 360 - 180:.0f} degrees"
         advice = f"no photo shows the side from azimuth {sector}, so it will be guessed: add photos from there"
     return Finding("directions", value, advice)
+
+
+def _upward(upward: np.ndarray) -> Finding:
+    value, advice = "z" if upward[2] == 1 else "({:.2f}, {:.2f}, {:.2f})".format(*upward + 0.0), ""
+    if upward[2] < 1:
+        advice = "the results stand as the data do, and other programs take their z for upward: turn the data's world"
+    return Finding("upward by the cameras", value, advice)
 
 
 def _inside(views: Sequence[ReducedView], fit: Fit) -> Finding:

@@ -126,7 +126,9 @@ def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Pa
     shares = []
     for i in tracked(range(len(split)), "masks, photo"):
         mask = find_mask(field, region, split, i)
-        write_image(folder / separated_mask(split.image_paths[i]), mask)
+        path = folder / separated_mask(split.image_paths[i], split.root)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_image(path, mask)
         shares.append(mask.mean())
     return np.array(shares)
 
@@ -136,7 +138,7 @@ def write_sheet(dataset: Dataset, folder: Path) -> None:
     rows, chosen = [], spread(range(len(dataset)), SHOWN)
     for i in chosen:
         photo = dataset.images[i, ..., :3]
-        mask = dataset.padded(resized_mask(read_image(folder / separated_mask(dataset.image_paths[i])), *dataset.sizes[i]))
+        mask = dataset.padded(resized_mask(read_image(folder / separated_mask(dataset.image_paths[i], dataset.root)), *dataset.sizes[i]))
         rows.append(photo * (DIMMED + (1 - DIMMED) * mask[..., None]))
     columns = -(-len(rows) // 3)
     rows += [np.zeros_like(rows[0])] * (3 * columns - len(rows))

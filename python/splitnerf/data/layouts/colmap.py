@@ -80,8 +80,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
 
 
 def _model_files(root: Path) -> tuple[Path, Path] | None:
-    """The files of cameras and images of the model with the most images, by the size of that file, or None; notes where
-    there are several."""
+    """The files of cameras and images of the model with the most images, or None; notes where there are several."""
     found: dict[Path, tuple[Path, Path]] = {}
     for place in PLACES:
         numbered = [path for path in (root / place).glob("*") if path.name.isdigit()]
@@ -92,17 +91,23 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
                     found[folder] = files
     if not found:
         return None
-    largest = max(found, key=lambda folder: (found[folder][1].stat().st_size, folder))
+    largest = next(iter(found)) if len(found) == 1 else max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
     if len(found) > 1:
-        note_once(f"{root}: has {len(found)} COLMAP models; the largest is read", str(largest))
+        note_once(f"{root}: has {len(found)} COLMAP models; the one with the most images is read", str(largest))
     return found[largest]
+
+
+def _n_images(path: Path) -> int:
+    """The number of images of a model's file."""
+    with _opened(path) as file:
+        return len(list(_images(file)))
 
 
 def _cameras(file: BinaryIO) -> Iterator[tuple[int, str, int, int, tuple[float, ...]]]:
     """Number, model, width, height and parameters of each camera."""
     if file.name.endswith(".txt"):
         for number, model, width, height, *parameters in filter(None, map(str.split, _lines(file))):
-            yield int(number), model, int(width), int(height), tuple(map(float, parameters))
+            yield int(number), model, _whole(width), _whole(height), tuple(map(float, parameters))
         return
     for _ in range(*_take(file, "Q")):
         number, model, width, height = _take(file, "IiQQ")
@@ -128,6 +133,13 @@ def _images(file: BinaryIO) -> Iterator[Image]:
             raise ValueError("it ends too early")
         file.seek(n_points * POINT_BYTES, os.SEEK_CUR)
         yield os.fsdecode(head[: head.index(b"\0")]), camera, tuple(motion)
+
+
+def _whole(text: str) -> int:
+    """A whole number, which may be written like 1920.0."""
+    if not float(text).is_integer():
+        raise ValueError(f"{text} pixels")
+    return int(float(text))
 
 
 def _lens_numbers(model: str, width: int, height: int, parameters: tuple[float, ...], path: Path) -> dict[str, object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from unicodedata import normalize
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from splitnerf.files import is_file
 from splitnerf.notes import note_once
 
 RIGID_TOLERANCE = 1e-3
+ROUNDED = 5e-3  # largest entry of R^T R - 1 of a rotation R whose entries have three decimals
 FARTHEST = 1e9  # largest distance from the origin, in the data's units
 OPENCV_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # from OpenGL's: y and z the other way
 
@@ -64,9 +66,13 @@ def checked_pose(matrix: object, name: str) -> np.ndarray:
     if not (np.abs(pose) <= FARTHEST).all():
         raise InputError(f"{name} has NaN, infinite or endless entries; repair or remove the frame")
     rotation = pose[:3, :3]
-    rigid = np.abs(rotation.T @ rotation - np.eye(3)).max() < RIGID_TOLERANCE and np.linalg.det(rotation) > 0
-    if not rigid or np.abs(pose[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
+    error = np.abs(rotation.T @ rotation - np.eye(3)).max()
+    if not error < ROUNDED or np.linalg.det(rotation) < 0 or np.abs(pose[3] - [0, 0, 0, 1]).max() > RIGID_TOLERANCE:
         raise InputError(f"{name} is not a rigid camera-to-world pose (scaled, sheared or mirrored); repair it")
+    if error > RIGID_TOLERANCE:
+        note_once("camera poses are rounded to few digits; the nearest rotations are used", name)
+        left, _, right = np.linalg.svd(rotation)
+        pose[:3, :3] = left @ right
     return pose
 
 
@@ -82,8 +88,9 @@ def folder_name(name: object, what: str) -> str:
 
 
 def listed_file(folder: Path, name: str, source: Path) -> Path:
-    """The path of a file that `source` lists relative to `folder`; notes once where it leads out of the folder."""
-    path = folder / name
+    """The path of a file that `source` lists relative to `folder`, in Windows' form or another Unicode form perhaps; notes once
+    where it leads out of the folder."""
+    path = next((folder / form for form in _forms(name) if is_file(folder / form)), folder / name)
     if not os.path.abspath(path).startswith(os.path.join(os.path.abspath(folder), "")):
         note_once(f"{source}: names files outside of its folder; they are read", f"{name!r} is one")
     return path
@@ -95,9 +102,17 @@ def listed_image(folder: Path, name: str, source: Path) -> Path:
     Raises:
         InputError: There is no such regular file.
     """
-    for suffix in ("", *LDR_SUFFIXES, *HDR_SUFFIXES):
-        if is_file(folder / f"{name}{suffix}"):
+    suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
+    for suffix in ("", *suffixes):
+        if any(is_file(folder / form) for form in _forms(f"{name}{suffix}")):
             return listed_file(folder, f"{name}{suffix}", source)
     raise InputError(
-        f"{folder / name}: no such image, though {source.name} lists it; add the image or remove the frame"
+        f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "
+        "frame"
     )
+
+
+def _forms(name: str) -> list[str]:
+    """A name as it is, with slashes for backslashes, and in the forms in which file systems keep letters with accents."""
+    slashes = name.replace("\\", "/")
+    return list(dict.fromkeys([name, slashes, normalize("NFC", slashes), normalize("NFD", slashes)]))

@@ -111,4 +111,4 @@ def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _pictures(folder: Path) -> list[Path]:
     """The images of a folder by name; none where it does not exist."""
-    return sorted(path for path in folder.glob("*") if path.suffix.lower() in LDR_SUFFIXES and path.is_file())
+    return sorted(path for path in folder.glob("*") if path.suffix.lower() in LDR_SUFFIXES and path.is_file() and not path.name.startswith("._"))

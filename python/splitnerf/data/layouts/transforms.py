@@ -12,7 +12,7 @@ Keys, those of a frame before those of the file:
     mask_kind                   what the masks mean, "object" or "ignore"; without it :mod:`splitnerf.data.dataset` finds out
     frames[].exposure           the factor of the image's linear values, 1 where it is missing
     gamma                       linear values are those of the image to this power, where the camera's curve is not sRGB's
-    camera_angle_x, or fl_x, fl_y, cx, cy, w, h   the pinhole
+    camera_angle_x, camera_angle_y, fl_x, fl_y, cx, cy, w, h   the pinhole; what is missing of one axis is that of the other
     camera_model or is_fisheye, k1 ... k4, p1, p2 the distortion, see :mod:`splitnerf.data.lens`
 
 Beside an image NAME.png a file dynamic_mask_NAME.png is white where the image is to be ignored (instant-ngp).
@@ -21,6 +21,7 @@ Beside an image NAME.png a file dynamic_mask_NAME.png is white where the image i
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,11 @@ from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
 from splitnerf.errors import InputError
 from splitnerf.files import is_file
+from splitnerf.notes import note_once
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
-FOCAL = ("camera_angle_x", "fl_x", "fl_y")
+FOCAL = ("camera_angle_x", "camera_angle_y", "fl_x", "fl_y")
 LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
 SMALLEST_EXPOSURE = 1e-4
 LARGEST_GAMMA = 5.0
@@ -51,8 +53,7 @@ def splits(root: Path) -> list[str] | None:
     if any((root / _own(split)).is_file() for split in SPLITS):
         return [split for split in SPLITS if (root / _own(split)).is_file()]
     meta, _ = read_entries(root / SINGLE)
-    listed = [split for split in SPLITS if _listed(meta, split) is not None]
-    return listed or None
+    return [split for split in SPLITS if split == "train" or _held_out(meta)] if _has_lists(meta) else None
 
 
 def read(root: Path, split: str | None) -> list[Frame]:
@@ -95,18 +96,42 @@ def _own(split: str) -> str:
     return f"transforms_{split}.json"
 
 
-def _listed(meta: dict, split: str) -> set[str] | None:
-    """The names of a split's images that a single file lists; None where it does not."""
-    lists = [meta[key] for key in SPLITS[split] if meta.get(key)]
-    return {os.path.normpath(str(name)) for name in lists[0]} if lists and isinstance(lists[0], list) else None
+def _has_lists(meta: dict) -> bool:
+    """Whether a single file says which of its frames are of a split."""
+    return any(isinstance(meta.get(key), list) and meta[key] for keys in SPLITS.values() for key in keys)
+
+
+def _listed(meta: dict, key: str) -> set[str]:
+    """The images that a list of a single file names."""
+    return {os.path.normpath(str(name)) for name in meta[key]} if isinstance(meta.get(key), list) else set()
+
+
+def _held_out(meta: dict) -> set[str]:
+    """The images that a single file lists for testing, or else for validation."""
+    return next((names for key in SPLITS["test"] if (names := _listed(meta, key))), set())
+
+
+def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
+    """Whether an image is of a split of a single file. What any list holds out is none of training; without a list of its own
+    the train split is all that no list holds out."""
+    if split == "test":
+        return _held_out(meta).__contains__
+    chosen = _listed(meta, "train_filenames")
+    others = set().union(*(_listed(meta, key) for key in SPLITS["test"]))
+    if chosen & others:
+        note_once("images that transforms.json lists for training and for testing are for testing", sorted(chosen & others)[0])
+    return lambda name: name not in others and (not chosen or name in chosen)
 
 
 def _frames(path: Path, split: str | None) -> list[Frame]:
-    """The frames of a file; of a single file those that it lists for the split."""
+    """The frames of a file; of a single file those that are of the split."""
     meta, entries = read_entries(path)
-    names = None if split is None else _listed(meta, split)
-    frames = [read_frame(entry, meta, i, path) for i, entry in enumerate(entries)
-              if names is None or os.path.normpath(str(entry.get("file_path"))) in names]  # fmt: skip
+    chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split)
+    frames = [
+        read_frame(entry, meta, i, path)
+        for i, entry in enumerate(entries)
+        if chosen(os.path.normpath(str(entry.get("file_path"))))
+    ]
     if not frames:
         raise InputError(f"{path}: has no frames for the {split} split; add posed images")
     return frames

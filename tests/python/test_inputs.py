@@ -1,0 +1,328 @@
+"""Forms in which photos, masks, lenses and lists come, and that each is read as it is meant."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from blender_data import ANGLE, SIZE, edit, make_blender
+from PIL import Image, ImageCms
+
+from splitnerf import notes
+from splitnerf.cli import DONE, main
+from splitnerf.data.dataset import load_dataset
+from splitnerf.data.frames import has_test_split
+from splitnerf.data.images import (
+    linear_to_srgb, read_codes, read_colours, read_header, read_image, read_radiance, srgb_to_linear, write_image,
+)  # fmt: skip
+from splitnerf.data.layouts import colmap
+from splitnerf.data.layouts.frame import checked_pose, listed_file, listed_image
+from splitnerf.data.lens import lens_intrinsics, read_lens
+from splitnerf.data.masks import read_mask
+from splitnerf.data.photos import separated_mask
+from splitnerf.errors import InputError
+from splitnerf.relight.background import read_plate
+from splitnerf_tools.capture.photographs import find_photographs, read_upright
+from splitnerf_tools.inspection.checks import inspect
+from splitnerf.data.reading import Reading
+
+DISC = np.hypot(*np.mgrid[-4:5, -4:5]) < 3.5
+
+
+@pytest.fixture(autouse=True)
+def unsaid(monkeypatch):
+    """No note was written yet."""
+    monkeypatch.setattr(notes, "_said", set())
+
+
+def png(pixels: np.ndarray, mode: str | None = None) -> Image.Image:
+    return Image.fromarray(pixels, mode)
+
+
+def rgba(colour: np.ndarray, alpha: np.ndarray) -> Image.Image:
+    return png(np.dstack([*[colour.astype(np.uint8)] * 3, alpha.astype(np.uint8)]))
+
+
+def palette(codes: np.ndarray, *colours: tuple[int, int, int]) -> Image.Image:
+    image = png(codes.astype(np.uint8), "P")
+    image.putpalette(sum(colours, ()))
+    return image
+
+
+FORMS = {
+    "white": png(DISC * np.uint8(255)),
+    "one": png(DISC * np.uint8(1)),
+    "labels from one": png(DISC + np.uint8(1)),
+    "half": png(DISC * np.uint8(128)),
+    "sixteen bits": png(DISC * np.uint16(65535)),
+    "sixteen bits, one": png(DISC * np.uint16(1)),
+    "alpha": rgba(np.full_like(DISC, 255, np.uint8), 255 * DISC),
+    "black with alpha": rgba(np.zeros_like(DISC, np.uint8), 255 * DISC),
+    "cut-out": png(np.dstack([np.random.default_rng(0).integers(0, 255, (*DISC.shape, 3), np.uint8), 255 * DISC.astype(np.uint8)])),
+    "opaque": rgba(255 * DISC, np.full_like(DISC, 255, np.uint8)),
+    "palette": palette(DISC, (0, 0, 0), (128, 0, 0)),
+    "palette, dark": palette(DISC, (200, 200, 200), (10, 10, 10)),
+    "colour, of two": png(np.repeat(255 * DISC[..., None].astype(np.uint8), 3, 2)),
+    "bits": png(255 * DISC.astype(np.uint8)).convert("1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_mask_is_read_in_each_form(tmp_path, form):
+    FORMS[form].save(tmp_path / "mask.png")
+    mask = read_mask(tmp_path / "mask.png")
+    assert mask.shape == (*DISC.shape, 1) and np.array_equal(mask[..., 0], DISC * np.iinfo(mask.dtype).max)
+
+
+def test_a_soft_mask_stays_as_it_is(tmp_path):
+    soft = np.linspace(0, 255, 81).astype(np.uint8).reshape(9, 9)
+    png(soft).save(tmp_path / "mask.png")
+    assert np.array_equal(read_mask(tmp_path / "mask.png")[..., 0], soft)
+    png(DISC * np.uint8(3)).save(tmp_path / "dark.jpg", quality=30)  # its values are not exact
+    assert read_mask(tmp_path / "dark.jpg").max() < 32
+    for value, expected in ((0, 0), (255, 255), (7, 255)):
+        png(np.full((9, 9), value, np.uint8)).save(tmp_path / "mask.png")
+        assert (read_mask(tmp_path / "mask.png") == expected).all()
+
+
+@pytest.mark.parametrize(("image", "message"), [
+    (png(np.uint8([[0, 1], [2, 1]])), "holds the labels 0, 1, 2"),
+    (png(np.uint8([[[255, 0, 0], [0, 0, 0]]])), "is coloured, which no mask is"),
+    (palette(np.uint8([[0, 1, 2]]), (0, 0, 0), (128, 0, 0), (0, 128, 0)), "holds the labels 0, 1, 2"),
+])  # fmt: skip
+def test_a_mask_that_may_mean_several_things_is_refused(tmp_path, image, message):
+    image.save(tmp_path / "mask.png")
+    with pytest.raises(InputError, match=f"mask.png: {message}"):
+        read_mask(tmp_path / "mask.png")
+
+
+def write_exr(path: Path, pixels: np.ndarray, names: tuple[str, ...], window: tuple[int, int, int, int] | None = None) -> None:
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "float")
+    spec.channelnames = names
+    if window:
+        spec.x, spec.y, spec.full_width, spec.full_height = window
+        spec.full_x = spec.full_y = 0
+    sink = oiio.ImageOutput.create(str(path))
+    assert sink.open(str(path), spec) and sink.write_image(pixels) and sink.close()
+
+
+@pytest.mark.parametrize("names", ["RGBAZ", "ZRGBA", "RGBZA", "BGRA", "RGB", ("depth.Z", "beauty.R", "beauty.G", "beauty.B", "beauty.A")])
+def test_channels_are_found_by_their_names(tmp_path, capsys, names):
+    value = {"R": 0.1, "G": 0.2, "B": 0.3, "A": 0.5, "Z": 9.0}
+    plain = [name[-1] for name in names]
+    pixels = np.tile(np.float32([value[name] for name in plain]), (4, 5, 1))
+    write_exr(tmp_path / "x.exr", pixels, tuple(names))
+    expected = [value[name] for name in "RGBA" if name in plain]
+    assert read_image(tmp_path / "x.exr")[2, 3] == pytest.approx(expected)
+    assert read_header(tmp_path / "x.exr") == (4, 5, len(expected), 32)
+    assert ("channels of images are not used" in capsys.readouterr().err) == ("Z" in plain)
+    if "Z" in plain:
+        assert read_radiance(tmp_path / "x.exr")[0, 0] == pytest.approx(expected[:3])
+
+
+@pytest.mark.parametrize(("left", "top"), [(2, 1), (-1, -2), (6, 4), (9, 9), (-5, 0)])
+def test_a_part_of_an_image_lies_where_its_window_says(tmp_path, left, top):
+    part, whole = np.random.default_rng(0).random((4, 5, 3), np.float32), np.zeros((6, 8, 3), np.float32)
+    for y in range(4):
+        for x in range(5):
+            if 0 <= y + top < 6 and 0 <= x + left < 8:
+                whole[y + top, x + left] = part[y, x]
+    write_exr(tmp_path / "x.exr", part, ("R", "G", "B"), (left, top, 8, 6))
+    assert np.array_equal(read_image(tmp_path / "x.exr"), whole) and read_header(tmp_path / "x.exr")[:2] == (6, 8)
+
+
+def wide_profile() -> bytes:
+    """An ICC profile with sRGB's curve, whose red is that of Display P3 (tag values: CSS Color 4, adapted to D50)."""
+    srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    columns = {b"rXYZ": (0.5151, 0.2412, -0.0011), b"gXYZ": (0.2920, 0.6922, 0.0419), b"bXYZ": (0.1571, 0.0666, 0.7841)}
+    for i in range(struct.unpack(">I", srgb[128:132])[0]):
+        tag, offset, size = struct.unpack(">4sII", srgb[132 + 12 * i : 144 + 12 * i])
+        if tag in columns:
+            srgb[offset + 8 : offset + 20] = struct.pack(">3i", *(round(65536 * x) for x in columns[tag]))
+        if tag == b"desc":
+            srgb[offset : offset + size] = srgb[offset : offset + size].replace("sRGB".encode("utf-16-be"), "wide".encode("utf-16-be"))
+    return bytes(srgb)
+
+
+# From linear Display P3 to linear sRGB (CSS Color 4, section 10).
+FROM_P3 = np.array([[1.2249401762, -0.2249401762, 0], [-0.0420569547, 1.0420569547, 0], [-0.0196375546, -0.0786360456, 1.0982736]])
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix):
+    photo = np.full((16, 16, 3), (180, 130, 90), np.uint8)
+    Image.fromarray(photo).save(tmp_path / f"x{suffix}", icc_profile=wide_profile(), quality=100, subsampling=0)
+    expected = 255 * linear_to_srgb((FROM_P3 @ srgb_to_linear(np.float32([180, 130, 90]) / 255)).astype(np.float32))
+    assert read_colours(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(expected, abs=2) and abs(expected[0] - 180) > 8
+    assert "are converted to sRGB" in capsys.readouterr().err
+    assert read_codes(tmp_path / f"x{suffix}")[3, 3] == pytest.approx([180, 130, 90], abs=2)  # a map of numbers
+    (photo_of,) = find_photographs(tmp_path)
+    assert read_upright(photo_of.path)[3, 3] == pytest.approx(expected, abs=2)
+    assert read_plate(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(srgb_to_linear(np.float32(expected) / 255), rel=0.06)
+
+
+def test_profiles_that_are_srgb_or_cannot_be_used_change_nothing(tmp_path, capsys):
+    photo = np.full((4, 4, 3), (180, 130, 90), np.uint8)
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    Image.fromarray(photo).save(tmp_path / "srgb.png", icc_profile=srgb)
+    assert np.array_equal(read_colours(tmp_path / "srgb.png"), photo) and capsys.readouterr().err == ""
+    spec, words = oiio.ImageSpec(4, 4, 3, "uint16"), np.uint16(photo) * 257
+    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(wide_profile())}]"), np.frombuffer(wide_profile(), np.uint8))
+    sink = oiio.ImageOutput.create("x.png")
+    assert sink.open(str(tmp_path / "words.png"), spec) and sink.write_image(words) and sink.close()
+    assert np.array_equal(read_colours(tmp_path / "words.png"), words)
+    assert "the colour profile of photos is not used" in capsys.readouterr().err
+
+
+def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
+    """A PNG file with another chunk before its pixels."""
+    buffer = io.BytesIO()
+    image.save(buffer, "png")
+    whole = buffer.getvalue()
+    return whole[:33] + struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) + whole[33:]
+
+
+@pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
+def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
+    (tmp_path / "x.png").write_bytes(with_chunk(png(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma))))
+    expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
+    assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
+    assert ("state the gamma" in capsys.readouterr().err) == (exponent is not None)
+
+
+def test_an_orientation_is_said(tmp_path, capsys):
+    exif = Image.Exif()
+    exif[274] = 3
+    png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
+    read_colours(tmp_path / "x.jpg")
+    assert "state an EXIF orientation; their pixels are used as they are stored (x.jpg: 3)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("exposures", [(), (2.0,), (4.0, 0.5)])
+def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, exposures):
+    write_image(tmp_path / "x.hdr", np.full((8, 16, 3), 0.5, np.float32))
+    whole = (tmp_path / "x.hdr").read_bytes()
+    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode()
+    (tmp_path / "x.hdr").write_bytes(whole.replace(b"FORMAT=", lines + b"FORMAT=", 1))
+    assert read_radiance(tmp_path / "x.hdr") == pytest.approx(0.5 / np.prod(exposures), rel=0.01)
+
+
+def test_grey_photos_of_sixteen_bits_keep_their_values(tmp_path):
+    png(np.full((4, 4), 30000, np.uint16)).save(tmp_path / "x.png")
+    assert (read_upright(tmp_path / "x.png") == 30000).all()
+    (tmp_path / "._x.png").write_bytes(b"a Mac's")
+    assert len(find_photographs(tmp_path)) == 1
+
+
+def test_the_content_of_a_plate_decides_its_curve(tmp_path):
+    write_image(tmp_path / "x.png", np.full((4, 4, 3), 0.5, np.float32))
+    (tmp_path / "x.png").rename(tmp_path / "x.exr")
+    assert read_plate(tmp_path / "x.exr") == pytest.approx(srgb_to_linear(np.float32([128 / 255]))[0], abs=1e-3)
+
+
+@pytest.mark.parametrize(("lens", "expected"), [
+    ({"camera_angle_x": 1.0, "camera_angle_y": 0.5}, (100 / np.tan(0.5), 75 / np.tan(0.25), 100, 75)),
+    ({"camera_angle_y": 0.5}, (75 / np.tan(0.25), 75 / np.tan(0.25), 100, 75)),
+    ({"fl_x": 150, "camera_angle_y": 0.5}, (150, 75 / np.tan(0.25), 100, 75)),
+    ({"fl_y": 120}, (120, 120, 100, 75)),
+    ({"fl_x": 300, "cx": -20, "cy": 500, "w": 400, "h": 300}, (150, 150, -10, 250)),
+])  # fmt: skip
+def test_each_number_of_a_lens_is_read(lens, expected):
+    assert lens_intrinsics(read_lens(lens, "x")[0], (150, 200)) == pytest.approx(expected)
+
+
+LISTS = [
+    ({"test_filenames": [1, 4]}, {0, 2, 3, 5}, {1, 4}),
+    ({"val_filenames": [2]}, {0, 1, 3, 4, 5}, {2}),
+    ({"test_filenames": [1], "val_filenames": [2]}, {0, 3, 4, 5}, {1}),
+    ({"train_filenames": [0, 3], "test_filenames": [1]}, {0, 3}, {1}),
+    ({"train_filenames": [0, 1, 3], "val_filenames": [1]}, {0, 3}, {1}),
+    ({"train_filenames": [0, 1, 3]}, {0, 1, 3}, None),
+]
+
+
+@pytest.mark.parametrize(("lists", "train", "test"), LISTS)
+def test_what_any_list_holds_out_is_held_out(tmp_path, lists, train, test):
+    make_blender(tmp_path, train=6, test=1)
+    content = json.loads((tmp_path / "transforms_train.json").read_text())
+    files = [frame["file_path"] for frame in content["frames"]]
+    content |= {key: [files[i] for i in numbers] for key, numbers in lists.items()}
+    (tmp_path / "transforms.json").write_text(json.dumps(content))
+    for split in ("train", "test"):
+        (tmp_path / f"transforms_{split}.json").unlink()
+    names = {f"r_{i}": i for i in range(6)}
+    assert {names[name] for name in load_dataset(tmp_path).frame_names} == train
+    assert has_test_split(tmp_path) == (test is not None)
+    if test is not None:
+        assert {names[name] for name in load_dataset(tmp_path, "test").frame_names} == test
+
+
+def test_rounded_poses_become_rotations(capsys):
+    rotation = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    pose = np.eye(4)
+    pose[:3, :3] = rotation * np.linalg.det(rotation)
+    rounded = np.round(pose, 2)
+    rounded[:3, :3] += (pose[:3, :3] - rounded[:3, :3]) * 0.7  # as of three decimals
+    found = checked_pose(rounded.tolist(), "x")
+    assert found[:3, :3].T @ found[:3, :3] == pytest.approx(np.eye(3), abs=2e-3) and np.abs(found - pose).max() < 2e-3
+    with pytest.raises(InputError, match="is not a rigid camera-to-world pose"):
+        checked_pose((pose * np.diag([1.01, 1, 1, 1])).tolist(), "x")
+
+
+def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
+    (tmp_path / "a").mkdir()
+    for name in ("a/u\u0308ber.png", "a/b.PNG", "a/c.JPG"):
+        (tmp_path / name).write_bytes(b"")
+    for listed, expected in (("a\\\u00fcber.png", "a/u\u0308ber.png"), ("a/b", "a/b.PNG"), (".\\a\\c", "a/c.JPG")):
+        assert listed_image(tmp_path, listed, Path("t")).samefile(tmp_path / expected)
+    assert listed_file(tmp_path, "a\\b.PNG", Path("t")).samefile(tmp_path / "a/b.PNG")
+
+
+def test_found_masks_have_names_of_their_own():
+    images = ["cam0/images/0.jpg", "cam1/images/0.jpg", "cam1/images/0.png", "cam1/0.jpg", "../cam1/0.jpg", "cam1_images/0.jpg"]
+    names = [separated_mask(Path("data") / image, Path("data")) for image in images]
+    assert len(set(names)) == len(images) and all(name.suffix == ".png" and ".." not in name.parts for name in names)
+
+
+def test_the_model_of_most_images_is_read_whatever_its_bytes(tmp_path):
+    for k, (n_images, n_points) in enumerate(((4, 1), (2, 900))):
+        folder = tmp_path / "sparse" / str(k)
+        folder.mkdir(parents=True)
+        (folder / "cameras.txt").write_text("1 PINHOLE 48.0 48 60 60 24 24\n")
+        points = " ".join(["1.0 2.0 7"] * n_points)
+        (folder / "images.txt").write_text("".join(f"{i} 1 0 0 0 0 0 {i} 1 r_{i}.png\n{points}\n" for i in range(n_images)))
+    (tmp_path / "images").mkdir()
+    for i in range(4):
+        write_image(tmp_path / f"images/r_{i}.png", np.ones((48, 48, 4), np.float32))
+    frames = colmap.read(tmp_path, None)
+    assert len(frames) == 4 and frames[0].lens["w"] == 48
+    (tmp_path / "sparse/0/cameras.txt").write_text("1 PINHOLE 48.5 48 60 60 24 24\n")
+    with pytest.raises(InputError, match="cameras.txt: is damaged"):
+        colmap.read(tmp_path, None)
+
+
+def test_data_of_close_ups_have_a_page(tmp_path, capsys):
+    """Each photo is suspected: the object is cut in all."""
+    data = make_blender(tmp_path / "data", train=8)
+    for split in ("train", "test"):
+        for path in (data / split).glob("*.png"):
+            write_image(path, read_image(path)[10:38, 10:38])
+        edit(data, lambda meta: meta.update(camera_angle_x=2 * np.arctan(np.tan(ANGLE / 2) * 28 / SIZE)), f"transforms_{split}.json")
+    assert main(["inspect", str(data), "--out", str(tmp_path / "page.html")]) == DONE
+    assert "cut" in capsys.readouterr().out and (tmp_path / "page.html").stat().st_size > 1000
+
+
+def test_a_world_that_hangs_is_said(tmp_path):
+    data = make_blender(tmp_path, train=8)
+    assert not {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"].advice
+    turn = np.diag([1.0, -1, -1, 1])
+    for frame in range(8):
+        edit(data, lambda meta: meta["frames"][frame].update(transform_matrix=(turn @ meta["frames"][frame]["transform_matrix"]).tolist()))
+    finding = {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"]
+    assert finding.value == "(0.00, 0.00, -1.00)" and "turn the data's world" in finding.advice
