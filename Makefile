@@ -1,5 +1,6 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
-# make test   installs, builds, looks at the budgets, and runs gtest and pytest
+# make test   installs, builds, checks form and budgets, and runs gtest and pytest
+# make lint   checks the form of all sources; make format brings them into it
 # make budget   prints how large each part is beside its budget, and fails where one is exceeded
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer, and the GPU's kernels with ThreadSanitizer
 # make faults   plants faults in the GPU's kernels and says what finds each
@@ -26,12 +27,23 @@ CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || tr
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
+.PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
 
-test: install budget gtest pytest
+test: install lint budget gtest pytest
+
+CPP := $(shell find cpp tests -name '*.cpp' -o -name '*.h' -o -name '*.cu' -o -name '*.cuh')
+lint: install
+	$(BIN)/ruff check --quiet python tests examples
+	$(BIN)/ruff format --quiet --check python tests examples
+	$(BIN)/clang-format --dry-run --Werror $(CPP)
+
+format: install
+	$(BIN)/ruff check --quiet --fix python tests examples
+	$(BIN)/ruff format --quiet python tests examples
+	$(BIN)/clang-format -i $(CPP)
 
 budget: install
 	@$(BIN)/python tests/budget.py

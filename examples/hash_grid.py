@@ -7,7 +7,6 @@ Prints the mean and the largest distance error, and the mean angle of the normal
 import math
 
 import torch
-
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 
@@ -22,7 +21,9 @@ def torus(x: torch.Tensor) -> torch.Tensor:
 
 def main(steps: int = 300) -> None:
     torch.manual_seed(0)
-    field = SdfField(HashGridSpec(n_levels=8, base_resolution=8, growth=1.4, log2_table_size=14), BOX, width=32, n_outputs=1)
+    field = SdfField(
+        HashGridSpec(n_levels=8, base_resolution=8, growth=1.4, log2_table_size=14), BOX, width=32, n_outputs=1
+    )
     optimiser = torch.optim.Adam(field.parameters(), lr=5e-3)
 
     for step in range(steps):

@@ -10,13 +10,12 @@ import tempfile
 
 import numpy as np
 import torch
-from torch import nn
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.ops import HashGridSpec, PackedSamples, composite, hash_encode, march_rays
 from splitnerf.render.rays import image_rays
 from splitnerf_tools.demo.scene import write_demo_dataset
+from torch import nn
 
 BOX, STEP, RESOLUTION = 1.5, 0.025, 48  # load_dataset brings the object into the box [-BOX, BOX]^3
 SPEC = HashGridSpec(n_levels=10, base_resolution=12, growth=1.4, log2_table_size=15)

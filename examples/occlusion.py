@@ -6,7 +6,6 @@ A sphere straight above, of half angle theta, hides a share sin^2(theta) of the 
 import numpy as np
 import torch
 import trimesh
-
 from splitnerf.ops import MeshScene, occlusion_factors
 
 HEIGHT = 2.0  # the sphere's centre above the plane

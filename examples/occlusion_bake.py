@@ -9,7 +9,6 @@ import sys
 import numpy as np
 import torch
 import trimesh
-
 from splitnerf.ops import MeshScene, occlusion_factors
 
 
@@ -19,9 +18,16 @@ def bake(mesh: trimesh.Trimesh, rays: int) -> np.ndarray:
     normals = torch.tensor(np.asarray(mesh.vertex_normals), dtype=torch.float32)
     scene, one = MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces)), torch.ones(len(positions), 1)
     o_d, _ = occlusion_factors(
-        scene, positions, normals, normals, one, torch.ones(16, 32, 3), n_diffuse_rays=rays, n_specular_rays=1,
+        scene,
+        positions,
+        normals,
+        normals,
+        one,
+        torch.ones(16, 32, 3),
+        n_diffuse_rays=rays,
+        n_specular_rays=1,
         offset=0.01 * float(np.median(mesh.edges_unique_length)),
-    )  # fmt: skip
+    )
     return o_d[:, 0].numpy()
 
 

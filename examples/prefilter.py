@@ -5,7 +5,6 @@ gbar = 1 + c(rho) k.n with one number c, which a one-dimensional integral gives.
 """
 
 import torch
-
 from splitnerf.ops import fibonacci_directions, prefilter_light
 
 

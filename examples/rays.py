@@ -6,7 +6,6 @@ Prints the depth's error against the exact intersection and writes the normals a
 import sys
 
 import torch
-
 from splitnerf.data.images import write_image
 from splitnerf.ops import CELL_OCCUPIED, composite, march_rays, surface_weights
 

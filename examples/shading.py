@@ -6,7 +6,6 @@ Three spheres a row, with roughness 0.1, 0.4 and 0.8; gold above, red plastic be
 import sys
 
 import torch
-
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.ops import fibonacci_directions, light_queries, prefilter_light, split_sum_shade
 
@@ -39,9 +38,16 @@ def shade(albedo: list[float], roughness: float, metallic: float) -> torch.Tenso
     diffuse = prefilter_light(normals, one, lights, light)
     image = torch.ones(SIZE, SIZE, 3)
     image[hit] = split_sum_shade(
-        normals, views, torch.tensor([albedo]).expand(len(normals), 3), roughness * one, metallic * one,
-        specular, diffuse, one, one,
-    )  # fmt: skip
+        normals,
+        views,
+        torch.tensor([albedo]).expand(len(normals), 3),
+        roughness * one,
+        metallic * one,
+        specular,
+        diffuse,
+        one,
+        one,
+    )
     return image
 
 

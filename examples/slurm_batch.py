@@ -53,9 +53,14 @@ def main() -> int:
         parser.error("a scene is called .jobs, as the folder of the jobs is; give it another name")
     executor = submitit.AutoExecutor(args.out / ".jobs", cluster=args.cluster)
     executor.update_parameters(
-        timeout_min=round(60 * args.hours), cpus_per_task=args.cores, mem_gb=args.memory, gpus_per_node=args.gpus,
-        slurm_array_parallelism=args.at_once, slurm_partition=args.partition, slurm_job_name="splitnerf",
-    )  # fmt: skip
+        timeout_min=round(60 * args.hours),
+        cpus_per_task=args.cores,
+        mem_gb=args.memory,
+        gpus_per_node=args.gpus,
+        slurm_array_parallelism=args.at_once,
+        slurm_partition=args.partition,
+        slurm_job_name="splitnerf",
+    )
     runs = [str((args.out / name).absolute()) for name in scenes]
     jobs = executor.map_array(Training(), list(map(str, scenes.values())), runs, [options] * len(runs))
     failed = 0

@@ -1,6 +1,6 @@
 """Prints how large each part of the project is beside its budget, tests/budget.toml, and fails where one is exceeded.
 
-    python tests/budget.py        (make budget)
+python tests/budget.py        (make budget)
 """
 
 from __future__ import annotations

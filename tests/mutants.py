@@ -46,8 +46,13 @@ TESTS = {
     "training/step.py": "test_finite.py test_correction.py test_schedule.py test_train.py",
 }
 # Of each kind of operator one replacement is enough; a bar stands in annotations, which nobody evaluates.
-LEFT_OUT = [r"core/ReplaceBinaryOperator_(?!Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul|FloorDiv_Div|Mod_Mul|MatMul_Mul)",
-            r"core/ReplaceUnaryOperator_.*_(Invert|Not)$", r"core/ReplaceComparisonOperator_.*_Is(Not)?$", r"core/ExceptionReplacer", r"core/RemoveDecorator"]  # fmt: skip
+LEFT_OUT = [
+    r"core/ReplaceBinaryOperator_(?!Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul|FloorDiv_Div|Mod_Mul|MatMul_Mul)",
+    r"core/ReplaceUnaryOperator_.*_(Invert|Not)$",
+    r"core/ReplaceComparisonOperator_.*_Is(Not)?$",
+    r"core/ExceptionReplacer",
+    r"core/RemoveDecorator",
+]
 SECONDS = 300  # of the tests with one mutant
 
 
@@ -80,16 +85,31 @@ def mutate(path: Path) -> tuple[int, int, list[str]]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command = " ".join([sys.executable, "-m pytest -q -x -p no:cacheprovider", *tests_of(path)])
-    lines = ["[cosmic-ray]", f'module-path = "{path.as_posix()}"', f"timeout = {SECONDS}.0", "excluded-modules = []",
-             f'test-command = "{command}"', "[cosmic-ray.distributor]", 'name = "local"',
-             "[cosmic-ray.filters.operators-filter]", f"exclude-operators = {json.dumps(LEFT_OUT)}"]  # fmt: skip
+    lines = [
+        "[cosmic-ray]",
+        f'module-path = "{path.as_posix()}"',
+        f"timeout = {SECONDS}.0",
+        "excluded-modules = []",
+        f'test-command = "{command}"',
+        "[cosmic-ray.distributor]",
+        'name = "local"',
+        "[cosmic-ray.filters.operators-filter]",
+        f"exclude-operators = {json.dumps(LEFT_OUT)}",
+    ]
     settings, session = folder / "settings.toml", folder / "session.sqlite"
     settings.write_text("\n".join(lines) + "\n")
     try:
         cosmic_ray("baseline", settings)
         cosmic_ray("init", settings, session)
-        subprocess.run([Path(shutil.which("cr-filter-operators") or Path(sys.executable).with_name("cr-filter-operators")),
-                        str(session), str(settings)], cwd=ROOT, check=True)  # fmt: skip
+        subprocess.run(
+            [
+                Path(shutil.which("cr-filter-operators") or Path(sys.executable).with_name("cr-filter-operators")),
+                str(session),
+                str(settings),
+            ],
+            cwd=ROOT,
+            check=True,
+        )
         cosmic_ray("exec", settings, session)
     finally:
         subprocess.run(["git", "checkout", "--quiet", "--", str(path)], cwd=ROOT, check=True)

@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 
 import torch
+from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE
 from torch import Tensor
 from torch.nn import functional as F
-
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE
 
 PRIMES = (1, 2654435761, 805459861)  # Teschner et al. 2003
 NEIGHBOURS = 16  # vertices that a point's visibility is averaged over
@@ -55,11 +54,26 @@ def layer_outputs(
 
 
 def sdf_field(
-    positions, table, hidden, hidden_length, hidden_bias, out, out_length, out_bias, beta, n_levels, base, growth, log2_size,
-    n_active, box,
-) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    positions,
+    table,
+    hidden,
+    hidden_length,
+    hidden_bias,
+    out,
+    out_length,
+    out_bias,
+    beta,
+    n_levels,
+    base,
+    growth,
+    log2_size,
+    n_active,
+    box,
+) -> tuple[Tensor, Tensor, Tensor]:
     """Outputs, features, and the gradient of the first output by differentiation, which is itself differentiated."""
-    hidden, out = (d * (length / d.norm(dim=1, keepdim=True)) for d, length in ((hidden, hidden_length), (out, out_length)))
+    hidden, out = (
+        d * (length / d.norm(dim=1, keepdim=True)) for d, length in ((hidden, hidden_length), (out, out_length))
+    )
     with torch.enable_grad():
         x = positions.detach().requires_grad_()
         features = hash_encode(x / (2 * box) + 0.5, table, n_levels, base, growth, log2_size, n_active)
@@ -124,7 +138,9 @@ def surface_weights(
     return normals, *neus_weights(sdf - half, sdf + half, s, offsets, min_transmittance)
 
 
-def composite(weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least: float = 1.0) -> Tensor:
+def composite(
+    weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least: float = 1.0
+) -> Tensor:
     """sum w v along each ray, over its opacity if that is given."""
     sums = torch.zeros(len(offsets) - 1, values.shape[1], dtype=values.dtype)
     sums = sums.index_add(0, ray_indices(offsets), weights[:, None] * values)
@@ -176,9 +192,21 @@ def gain(f0: Tensor | float, f1: Tensor, f2: Tensor, compensate: bool) -> Tensor
 
 
 def split_sum_shade(
-    normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d, lut, mode, compensate,
-    indirect_s=None, indirect_d=None,
-) -> Tensor:  # fmt: skip
+    normals,
+    view_dirs,
+    albedo,
+    roughness,
+    metallic,
+    specular,
+    diffuse,
+    occlusion_s,
+    occlusion_d,
+    lut,
+    mode,
+    compensate,
+    indirect_s=None,
+    indirect_d=None,
+) -> Tensor:
     """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and
     the dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and
     then L_d."""
@@ -252,7 +280,9 @@ def drawn_directions(
     """
     generator, golden = torch.Generator().manual_seed(seed), (5**0.5 - 1) / 2
     normals, _ = facing(normals, view_dirs)
-    tangent = F.normalize(torch.linalg.cross(normals, normals.roll(1, 1) * torch.tensor([1.0, -1.0, 1.0]).to(normals)), dim=1)
+    tangent = F.normalize(
+        torch.linalg.cross(normals, normals.roll(1, 1) * torch.tensor([1.0, -1.0, 1.0]).to(normals)), dim=1
+    )
     frame = torch.stack([tangent, torch.linalg.cross(normals, tangent), normals], 2)  # its columns are the axes
     view, alpha = (view_dirs[:, None] @ frame), (roughness**2).clamp(min=2e-3)[..., None]
 
@@ -424,9 +454,21 @@ def cached_visibility(
 
 
 def cached_occlusion(
-    positions, normals, lobe_dirs, roughness, vertices, vertex_normals, starts, order, radius, bits, hits, radiance,
-    directions, light,
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:  # fmt: skip
+    positions,
+    normals,
+    lobe_dirs,
+    roughness,
+    vertices,
+    vertex_normals,
+    starts,
+    order,
+    radius,
+    bits,
+    hits,
+    radiance,
+    directions,
+    light,
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Shares of the light and means of the mesh's light, under the cosine and under the lobe, [n, 3] each."""
     visible, sent = cached_visibility(
         positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions

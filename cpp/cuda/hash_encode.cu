@@ -43,10 +43,10 @@ void hash_encode_backward_positions(const Queue& queue, const HashGridShape& sha
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                    \
-  template void hash_encode<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, HashTable, T*);          \
-  template void hash_encode_backward<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, const T*, T*);  \
-  template void hash_encode_backward_positions<T>(const Queue&, const HashGridShape&, int, int64_t, const T*,       \
+#define SPLITNERF_INSTANTIATE(T)                                                                                   \
+  template void hash_encode<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, HashTable, T*);         \
+  template void hash_encode_backward<T>(const Queue&, const HashGridShape&, int, int64_t, const T*, const T*, T*); \
+  template void hash_encode_backward_positions<T>(const Queue&, const HashGridShape&, int, int64_t, const T*,      \
                                                   HashTable, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -37,9 +37,7 @@ __global__ void __launch_bounds__(kTile)
     gather_kernel(const QueryList<T> queries, const LightList<T> lights, int n_parts, T* parts) {
   meet_sources<T>(
       queries.n, n_parts, lights,
-      [&](int64_t i) {
-        return LobeGather<T>{load3(queries.directions + 3 * i), queries.alpha_squared(i)};
-      },
+      [&](int64_t i) { return LobeGather<T>{load3(queries.directions + 3 * i), queries.alpha_squared(i)}; },
       [&](int part, int64_t i, const LobeGather<T>& item) {
         T* to = parts + 4 * (part * queries.n + i);
         store3(to, item.value);

@@ -9,7 +9,7 @@
 namespace splitnerf::cuda {
 namespace {
 
-constexpr int kWalkThreads = 128;          // threads of a block that walks along rays
+constexpr int kWalkThreads = 128;  // threads of a block that walks along rays
 constexpr int kWalkWarps = kWalkThreads / Warp::size, kWalkPoints = Warp::size / kWalkLanes;
 constexpr int kMostCopied = 40 * 1024;  // bytes of weights that it copies: with more, too few blocks share a processor
 

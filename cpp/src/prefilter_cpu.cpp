@@ -62,8 +62,8 @@ void prefilter_light_backward(int64_t n_queries, const T* query_dirs, const T* r
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                                                     \
-  template void prefilter_light<T>(int64_t, const T*, const T*, int64_t, const T*, const T*, T*, T*);                \
+#define SPLITNERF_INSTANTIATE(T)                                                                      \
+  template void prefilter_light<T>(int64_t, const T*, const T*, int64_t, const T*, const T*, T*, T*); \
   template void prefilter_light_backward<T>(int64_t, const T*, const T*, const T*, const T*, int64_t, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

@@ -122,8 +122,6 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
       "int[] copied, Tensor? allowed=None) -> ()");
 }
 
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("adamw_steps_", TORCH_BOX(&adamw_steps));
-}
+SPLITNERF_IMPLEMENT(m) { m.impl("adamw_steps_", TORCH_BOX(&adamw_steps)); }
 
 }  // namespace splitnerf::glue

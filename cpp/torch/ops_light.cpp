@@ -116,8 +116,6 @@ SPLITNERF_IMPLEMENT(m) {
 }
 
 // Rays are traced on the CPU.
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
-  m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors));
-}
+STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) { m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors)); }
 
 }  // namespace splitnerf::glue

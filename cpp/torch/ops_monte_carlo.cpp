@@ -176,8 +176,12 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_ba
   const SummedInputs i(op, normals, view_dirs, albedo, roughness, metallic, sums, lut, other, share);
   const Tensor g = checked(op, "grad_radiance", grad_radiance, {i.n_points(), 3}, i.type);
   const auto like = [&](const Tensor& t) { return torch::stable::empty_like(t); };
-  Tensor grad[7] = {like(i.normals),   like(i.view_dirs), like(i.albedo),
-                    like(i.roughness), like(i.metallic),  like(i.sums),
+  Tensor grad[7] = {like(i.normals),
+                    like(i.view_dirs),
+                    like(i.albedo),
+                    like(i.roughness),
+                    like(i.metallic),
+                    like(i.sums),
                     empty_like_type(g, {i.other ? i.n_points() : 0, 3}, i.type)};
   on_device(i.type, [&](auto zero, const auto& device) {
     using T = decltype(zero);

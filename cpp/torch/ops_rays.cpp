@@ -202,13 +202,13 @@ Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, 
   const auto indices = [&](int64_t n) { return empty_like_type(w, {n}, ScalarType::Long); };
   Tensor first = indices(w.size(0)), second = indices(w.size(0)), share = empty_like_type(w, {w.size(0)}, type);
   Tensor shaded, heaviest, leaders, stretch, sizes = indices(3);
-  const SpreadAllocator allocator{
-      [&](const SpreadSizes& n) {
-        shaded = indices(n.shaded), heaviest = indices(n.heaviest);
-        leaders = indices(n.leaders), stretch = indices(n.shaded);
-        return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders), out<int64_t>(stretch), n};
-      },
-      fixed ? &room : nullptr};
+  const SpreadAllocator allocator{[&](const SpreadSizes& n) {
+                                    shaded = indices(n.shaded), heaviest = indices(n.heaviest);
+                                    leaders = indices(n.leaders), stretch = indices(n.shaded);
+                                    return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders),
+                                                  out<int64_t>(stretch), n};
+                                  },
+                                  fixed ? &room : nullptr};
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const auto inside = [](T p) { return p >= T(0) && p < T(1); };

@@ -191,7 +191,6 @@ class SideStream:
             torch.cuda.current_stream(self._device).wait_stream(self._stream)
 
 
-
 def in_background(function: Callable, *args: object) -> Future:
     """Calls a function in a thread of its own, which ends with the program; the future holds its result or
     exception."""

@@ -138,7 +138,13 @@ def load_with_masks(
 
 
 def deliver(
-    trained: TrainedScene, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool, observer: Observer = NOBODY
+    trained: TrainedScene,
+    dataset: Dataset,
+    test: Dataset | None,
+    run: Path,
+    *,
+    resume: bool,
+    observer: Observer = NOBODY,
 ) -> dict | None:
     """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
 
@@ -219,9 +225,15 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, ob
 
 
 def score_run(
-    run: Path, model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, timings: dict[str, float],
-    maps: dict[str, Path], spp: int,
-) -> Evaluated:  # fmt: skip
+    run: Path,
+    model: SceneModel,
+    grid: OccupancyGrid,
+    views: Dataset,
+    mesh: trimesh.Trimesh | None,
+    timings: dict[str, float],
+    maps: dict[str, Path],
+    spp: int,
+) -> Evaluated:
     """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields. Where
     the run learned exposures, each view gets one by its own image.
 
@@ -325,6 +337,12 @@ def export_run(
             with atomic_path(out / ORIGIN) as temporary:
                 shutil.copyfile(run / ORIGIN, temporary)
         return write_assets(
-            out, model, content["box_from_world"].numpy(), Cameras(**content["cameras"]), formats=formats,
-            resolution=resolution, n_faces=n_faces, texture_size=texture_size,
-        )  # fmt: skip
+            out,
+            model,
+            content["box_from_world"].numpy(),
+            Cameras(**content["cameras"]),
+            formats=formats,
+            resolution=resolution,
+            n_faces=n_faces,
+            texture_size=texture_size,
+        )

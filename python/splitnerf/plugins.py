@@ -19,7 +19,13 @@ from splitnerf.notes import note
 
 GROUP = "splitnerf.commands"
 BUNDLED = EntryPoint("tools", "splitnerf_tools.plugin:PLUGIN", GROUP)
-TITLES = ("data", "reconstruction", "results", "many runs", "this installation")  # the groups of `splitnerf --help`, in order
+TITLES = (
+    "data",
+    "reconstruction",
+    "results",
+    "many runs",
+    "this installation",
+)  # the groups of `splitnerf --help`, in order
 
 
 class Command(Protocol):
@@ -64,6 +70,7 @@ def installed() -> Plugin:
     commands = {title: sum((plugin.commands.get(title, ()) for plugin in found), ()) for title in TITLES}
     hooks = {
         hook.name: next((f for plugin in found if (f := getattr(plugin, hook.name)) is not None), None)
-        for hook in fields(Plugin) if hook.name != "commands"
-    }  # fmt: skip
+        for hook in fields(Plugin)
+        if hook.name != "commands"
+    }
     return Plugin(commands, **hooks)

@@ -88,9 +88,13 @@ class Progress:
         self._stream = sys.stderr
         self._is_terminal = self._stream.isatty()
         self._bar = tqdm(
-            total=100.0, initial=100.0 * start, file=self._stream, disable=not self._is_terminal, leave=leave,
+            total=100.0,
+            initial=100.0 * start,
+            file=self._stream,
+            disable=not self._is_terminal,
+            leave=leave,
             bar_format="{percentage:3.0f}%|{bar:30}| {elapsed}<{remaining}{postfix}",
-        )  # fmt: skip
+        )
         self._start, self._started, self._last_line = start, time.monotonic(), -LINE_EVERY if at_once else 0.0
 
     def __enter__(self) -> Progress:
@@ -109,7 +113,9 @@ class Progress:
             self._last_line = elapsed
             made = progress - self._start
             left = tqdm.format_interval(elapsed * (1.0 - progress) / made) if made > 0 else "?"
-            print(f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {text}", file=self._stream, flush=True)
+            print(
+                f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {text}", file=self._stream, flush=True
+            )
 
     @contextmanager
     def aside(self) -> Iterator[None]:

@@ -17,9 +17,19 @@ ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = (
-    "config.toml", "checkpoint.pt", METRICS, "mesh.ply", "mesh.glb", "environment.exr", "environment.hdr",
-    "evaluation.json", "report.html", ORIGIN, EXPOSURES, *REFINEMENT_FILES,
-)  # fmt: skip
+    "config.toml",
+    "checkpoint.pt",
+    METRICS,
+    "mesh.ply",
+    "mesh.glb",
+    "environment.exr",
+    "environment.hdr",
+    "evaluation.json",
+    "report.html",
+    ORIGIN,
+    EXPOSURES,
+    *REFINEMENT_FILES,
+)
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:

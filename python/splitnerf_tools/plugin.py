@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from splitnerf.plugins import Plugin
+
 from splitnerf_tools.commands import ablate, batch, bench, demo, doctor, inspect, prepare, synth, view
 
 if TYPE_CHECKING:
@@ -16,9 +17,7 @@ if TYPE_CHECKING:
     from splitnerf.training.observer import Observer
 
 
-def find_masks(
-    train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int
-) -> float:
+def find_masks(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> float:
     from splitnerf_tools.separation.separate import separate
 
     return separate(train, test, folder, steps=steps, minutes=minutes, seed=seed).seconds
@@ -44,8 +43,13 @@ def failing_operators(device: str) -> tuple[list[str], int]:
 
 PLUGIN = Plugin(
     commands={
-        "data": (prepare, inspect, synth), "results": (view,), "many runs": (batch, ablate),
+        "data": (prepare, inspect, synth),
+        "results": (view,),
+        "many runs": (batch, ablate),
         "this installation": (doctor, bench, demo),
     },
-    find_masks=find_masks, write_report=write_report, watch=watch, failing_operators=failing_operators,
-)  # fmt: skip
+    find_masks=find_masks,
+    write_report=write_report,
+    watch=watch,
+    failing_operators=failing_operators,
+)

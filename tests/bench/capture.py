@@ -17,11 +17,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from splitnerf_tools.capture.photometry import Exposures
-from splitnerf_tools.capture.prepare import PrepareSettings, exposures_of, write_data
 from splitnerf_tools.capture.photographs import find_photographs
+from splitnerf_tools.capture.photometry import Exposures
 from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
+from splitnerf_tools.capture.prepare import PrepareSettings, exposures_of, write_data
 from splitnerf_tools.capture.world import settle
 
 PARTS = ("cameras", "masks", "exposures")

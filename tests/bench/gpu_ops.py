@@ -23,22 +23,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 import torch
-from torch import Tensor
-from torch.utils._python_dispatch import TorchDispatchMode
-from torch.utils._pytree import tree_leaves, tree_map
-
-from splitnerf_tools.bench.provenance import header, provenance
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.devices import tensor_cores
 from splitnerf.training.loop import Training
+from splitnerf_tools.bench.provenance import header, provenance
+from torch import Tensor
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves, tree_map
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "python"), str(Path(__file__).parents[1])]
 import reference  # noqa: E402
+from bench.gpu_train import Silence  # noqa: E402
 from op_cases import ROUNDED_ALIKE, truth  # noqa: E402
 from op_checks import as_tuple  # noqa: E402
-
-from bench.gpu_train import Silence  # noqa: E402
 
 SOURCES = ("cpp", "python/splitnerf/ops")
 # an operator may be so many times as far from the truth as the CPU in float32 is, and so much more
@@ -71,7 +69,12 @@ def calls_of_a_step(data: Path, config, device: str, steps: int) -> dict[str, Ca
     """The largest call of each operator in a step that follows `steps` others and a mesh."""
     with tempfile.TemporaryDirectory() as run:
         (Path(run) / "metrics.jsonl").touch()
-        training = Training(load_dataset(data), config.replace({"cuda_graphs": False, "steps": 100 * steps}), Path(run), torch.device(device))
+        training = Training(
+            load_dataset(data),
+            config.replace({"cuda_graphs": False, "steps": 100 * steps}),
+            Path(run),
+            torch.device(device),
+        )
         for i in range(steps):
             training.refresh()
             training.advance(Silence())
@@ -144,7 +147,10 @@ def truth_of(name: str, func: Callable, args: tuple) -> tuple:
     stored = next((x for x in args if isinstance(x, Tensor) and x.dtype in HALVES), None)
     if stored is not None:  # a copy beside its table in float32: the operator reads the copy
         tables = [isinstance(x, Tensor) and x.shape == stored.shape for x in args]
-        args = tuple(stored if there and x is not stored else x if not there or sum(tables) == 1 else None for x, there in zip(args, tables))
+        args = tuple(
+            stored if there and x is not stored else x if not there or sum(tables) == 1 else None
+            for x, there in zip(args, tables)
+        )
     return as_tuple(func(*(args if name in ROUNDED_ALIKE else truth(args))))
 
 
@@ -176,8 +182,16 @@ def measure(name: str, call: Call, clock: Clock, rate: float) -> list[str]:
                 beside = clock.in_a_graph(lambda: plain(*args))
             except Exception as failure:  # of other arguments, or for want of memory: the operator's own line stands
                 beside = str(failure).splitlines()[0][:80]
-    return [name, f"{1e3 * cold:.4f} ({1e3 * low:.4f} to {1e3 * high:.4f})", clock.in_a_graph(lambda: func(*args)), beside,
-            f"{moved / cold / 1e9:.1f}", f"{moved / cold / rate:.3g}", f"{error:.1e}", note]  # fmt: skip
+    return [
+        name,
+        f"{1e3 * cold:.4f} ({1e3 * low:.4f} to {1e3 * high:.4f})",
+        clock.in_a_graph(lambda: func(*args)),
+        beside,
+        f"{moved / cold / 1e9:.1f}",
+        f"{moved / cold / rate:.3g}",
+        f"{error:.1e}",
+        note,
+    ]
 
 
 def main() -> int:
@@ -202,7 +216,9 @@ def main() -> int:
     rows = ["| " + " | ".join(cells) + " |" for cells in (HEAD, ["---"] * len(HEAD), *lines)]
     said = f"a copy {rate / 1e9:.0f} GB/s; {len(lines)} operators, {n_failed} failed"
     args.out.mkdir(parents=True, exist_ok=True)
-    (args.out / "ops.md").write_text("\n".join(["# Operators of a step", "", header(provenance(SOURCES)), "", said, "", *rows]) + "\n")
+    (args.out / "ops.md").write_text(
+        "\n".join(["# Operators of a step", "", header(provenance(SOURCES)), "", said, "", *rows]) + "\n"
+    )
     print(said)
     return 1 if n_failed else 0
 

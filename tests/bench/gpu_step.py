@@ -26,10 +26,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import torch
-from torch import Tensor
-from torch.overrides import TorchFunctionMode
-from torch.utils._pytree import tree_leaves, tree_map
-
 from splitnerf.config import Config, preset
 from splitnerf.config.presets import parse_setting
 from splitnerf.data.dataset import Dataset, load_dataset
@@ -41,6 +37,9 @@ from splitnerf.training.gpu_step import SAMPLE_SLACK, in_units
 from splitnerf.training.loop import Training
 from splitnerf.training.schedule import light_moves
 from splitnerf_tools.bench.provenance import header, provenance
+from torch import Tensor
+from torch.overrides import TorchFunctionMode
+from torch.utils._pytree import tree_leaves, tree_map
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("cpp", "python/splitnerf")
@@ -295,7 +294,9 @@ class Graphed:
         step.last, allowed = pending.read(), bool(pending.allowed)
         step.s = training.model.s_value
         if not allowed == fits == step.judge(step.last):
-            raise RuntimeError(f"{step.last.counts} and {step.capacity}: the device says {allowed}, and it should be {fits}")
+            raise RuntimeError(
+                f"{step.last.counts} and {step.capacity}: the device says {allowed}, and it should be {fits}"
+            )
         return collected(training, ray, terms)
 
     def replayed(self, n: int) -> Answer:
@@ -332,8 +333,13 @@ class Graphed:
 
 def page(sections: dict[str, list[Row]]) -> str:
     """All rows, the worst of each section first."""
-    lines = ["# One training step on two devices", "", header(provenance(SOURCES, root=ROOT)), "",
-             "Errors: root mean square of the difference from the CPU's float64, over that of the float64."]  # fmt: skip
+    lines = [
+        "# One training step on two devices",
+        "",
+        header(provenance(SOURCES, root=ROOT)),
+        "",
+        "Errors: root mean square of the difference from the CPU's float64, over that of the float64.",
+    ]
     for name, rows in sections.items():
         lines += ["", f"## {name}", "", "| | error | of the CPU in float32 | limit | |", "|---|---|---|---|---|"]
         for row in sorted(rows, key=lambda r: r.share, reverse=True):
@@ -342,12 +348,16 @@ def page(sections: dict[str, list[Row]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def sections_of(dataset: Dataset, config: Config, run: Path, device: str, steps: int) -> Iterator[tuple[str, list[Row]]]:
+def sections_of(
+    dataset: Dataset, config: Config, run: Path, device: str, steps: int
+) -> Iterator[tuple[str, list[Row]]]:
     """The comparisons, one after the other, so that a failure does not hide what came before."""
     begun(dataset, config, run, steps)
     ours, truth, there = (
-        restored(dataset, config, run, "cpu"), in_float64(dataset, config, run), restored(dataset, config, run, device)
-    )  # fmt: skip
+        restored(dataset, config, run, "cpu"),
+        in_float64(dataset, config, run),
+        restored(dataset, config, run, device),
+    )
     work, draws, (true, on_cpu, found) = same_choice(ours, truth, there)
     yield f"{device} against the CPU", [*compared(there, true, on_cpu, found), other_rays(there, work)]
     if device == "cuda":
@@ -381,8 +391,11 @@ def main() -> int:
                 sections[name] = rows
                 worst = max(rows, key=lambda r: r.share)
                 n_wrong = sum(not row.holds for row in rows)
-                print(f"{name}: {len(rows) - n_wrong} of {len(rows)} agree, the worst at {worst.share:.2g} of its "
-                      f"limit ({worst.name})", flush=True)  # fmt: skip
+                print(
+                    f"{name}: {len(rows) - n_wrong} of {len(rows)} agree, the worst at {worst.share:.2g} of its "
+                    f"limit ({worst.name})",
+                    flush=True,
+                )
         finally:
             if args.out is not None:
                 args.out.mkdir(parents=True, exist_ok=True)

@@ -20,9 +20,6 @@ import time
 from pathlib import Path
 
 import torch
-from torch.autograd import DeviceType
-from torch.profiler import ProfilerActivity, profile
-
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset, spread
 from splitnerf.devices import choose_device
@@ -30,6 +27,8 @@ from splitnerf.evaluate.jobs import Protocol, score_fields
 from splitnerf.training.loop import TrainedScene, Training
 from splitnerf.training.metrics import METRICS
 from splitnerf_tools.bench.provenance import header, provenance
+from torch.autograd import DeviceType
+from torch.profiler import ProfilerActivity, profile
 
 SOURCES = ("cpp", "python/splitnerf")
 SHOWN = 60  # kernels
@@ -82,20 +81,29 @@ class Look:
     def look(self) -> None:
         ends, last = self.ends[: self.until - self.first + 1], self.ends[-1]
         each = [1e3 * (b - a) for a, b in zip(ends, ends[1:])]
-        self.said = (f"steps {self.first} to {self.until}: {sum(each) / len(each):.3f} ms a step, median {statistics.median(each):.3f}, "
-                     f"longest {max(each):.1f}")  # fmt: skip
+        self.said = (
+            f"steps {self.first} to {self.until}: {sum(each) / len(each):.3f} ms a step, median {statistics.median(each):.3f}, "
+            f"longest {max(each):.1f}"
+        )
         if self.cuda:
             self.said += f"; {torch.cuda.max_memory_allocated() >> 20} MiB at most ({torch.cuda.max_memory_reserved() >> 20} reserved)"
-        events = [event for event in self.profiler.key_averages() if (event.device_type == DeviceType.CUDA) == self.cuda
-                  and not getattr(event, "is_user_annotation", False)]  # fmt: skip
+        events = [
+            event
+            for event in self.profiler.key_averages()
+            if (event.device_type == DeviceType.CUDA) == self.cuda and not getattr(event, "is_user_annotation", False)
+        ]
         own = {x.key: (x.self_device_time_total if self.cuda else x.self_cpu_time_total) / 1e3 for x in events}
         counts, busy, n = {x.key: x.count for x in events}, sum(own.values()), self.profiled
-        self.said += (f"; {1e3 * (last - ends[-1]) / n:.3f} ms a step under the profiler, of which {busy / n:.3f} ms in "
-                      f"{sum(counts.values()) / n:.0f} kernels and copies")  # fmt: skip
+        self.said += (
+            f"; {1e3 * (last - ends[-1]) / n:.3f} ms a step under the profiler, of which {busy / n:.3f} ms in "
+            f"{sum(counts.values()) / n:.0f} kernels and copies"
+        )
         self.lines = [self.said + ".", "", "| ms a step | share | calls a step | us a call | name |", 5 * "|---" + "|"]
         for name in sorted(own, key=own.__getitem__, reverse=True)[:SHOWN]:
             a_call = 1e3 * own[name] / counts[name]
-            self.lines.append(f"| {own[name] / n:.4f} | {own[name] / busy:.1%} | {counts[name] / n:.1f} | {a_call:.1f} | `{short(name)}` |")
+            self.lines.append(
+                f"| {own[name] / n:.4f} | {own[name] / busy:.1%} | {counts[name] / n:.1f} | {a_call:.1f} | `{short(name)}` |"
+            )
 
 
 def short(name: str) -> str:
@@ -111,15 +119,21 @@ def summary(run: Path, trained: TrainedScene, data: Path, views: int) -> str:
     half = next(x for x in steps if x["step"] >= trained.step / 2)
     rate = (trained.step - half["step"]) / max(trained.seconds - half["seconds"], 1e-9)
     result: dict[str, object] = {"steps": trained.step, "seconds": trained.seconds, "steps_a_second": rate}
-    said = [f"{trained.step} steps in {trained.seconds:.0f} s, {rate:.1f} a second at the end, {steps[-1]['skipped']} skipped"]
+    said = [
+        f"{trained.step} steps in {trained.seconds:.0f} s, {rate:.1f} a second at the end, {steps[-1]['skipped']} skipped"
+    ]
     if trained.model.device.type == "cuda":
         result["MiB"] = torch.cuda.max_memory_allocated() >> 20, torch.cuda.max_memory_reserved() >> 20
         said.append("{} MiB at most ({} reserved)".format(*result["MiB"]))
     test = load_dataset(data, "test")
     views = test.select(spread(range(len(test)), views))
     scores = score_fields(trained.model, trained.grid, views, None, None, {}, Protocol.spp, trained.seconds).scores
-    shown = {"novel views {:.2f} dB": scores["novel_view"]["psnr"], "albedo {:.2f} dB": (scores["albedo"] or {}).get("psnr"),
-             "light {:.2f} dB": scores["light_psnr"], "normals {:.2f} degrees": scores["normal_mae_deg"]}  # fmt: skip
+    shown = {
+        "novel views {:.2f} dB": scores["novel_view"]["psnr"],
+        "albedo {:.2f} dB": (scores["albedo"] or {}).get("psnr"),
+        "light {:.2f} dB": scores["light_psnr"],
+        "normals {:.2f} degrees": scores["normal_mae_deg"],
+    }
     said += [text.format(score) for text, score in shown.items() if score is not None]
     (run / "training.json").write_text(json.dumps(result | {"scores": scores}, indent=1) + "\n")
     return ", ".join(said)
@@ -138,7 +152,9 @@ def main() -> int:
     parser.add_argument("--page", type=Path, help="where what is seen is written")
     parser.add_argument("--profiled", type=int, default=20, help="steps (default: 20)")
     args = parser.parse_args()
-    config = preset(args.preset).replace({"run.preview_every": 1.0} | dict(map(parse_setting, args.settings)) | {"run.steps": args.steps})
+    config = preset(args.preset).replace(
+        {"run.preview_every": 1.0} | dict(map(parse_setting, args.settings)) | {"run.steps": args.steps}
+    )
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / METRICS).write_text("")
     training = Training(load_dataset(args.data), config, args.out, choose_device(args.device))

@@ -22,7 +22,6 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
 from splitnerf.export.glb import write_glb
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -99,8 +98,9 @@ def rings() -> list[Tube]:
     def metal(colour, rough, seed):
         return lambda s, t: (
             mix(np.multiply(colour, 0.85), colour, noise(s, t, 30, 3, seed)),
-            rough + 0.12 * noise(s, t, 6, 20, seed + 50), 1.0,
-        )  # fmt: skip
+            rough + 0.12 * noise(s, t, 6, 20, seed + 50),
+            1.0,
+        )
 
     def enamel(ground, figure, colour, seed):
         def paint(s, t):
@@ -116,10 +116,13 @@ def rings() -> list[Tube]:
         return lambda s, t: size / (np.cos(TAU * t) ** 4 + np.sin(TAU * t) ** 4) ** 0.25
 
     paints = [
-        enamel((0.50, 0.03, 0.02), (0.75, 0.62, 0.40), gold, 2), metal(gold, 0.12, 3),
-        enamel((0.02, 0.12, 0.30), (0.65, 0.70, 0.72), steel, 4), metal(copper, 0.22, 5),
-        enamel((0.70, 0.66, 0.52), (0.02, 0.22, 0.12), copper, 6), metal(steel, 0.10, 7),
-    ]  # fmt: skip
+        enamel((0.50, 0.03, 0.02), (0.75, 0.62, 0.40), gold, 2),
+        metal(gold, 0.12, 3),
+        enamel((0.02, 0.12, 0.30), (0.65, 0.70, 0.72), steel, 4),
+        metal(copper, 0.22, 5),
+        enamel((0.70, 0.66, 0.52), (0.02, 0.22, 0.12), copper, 6),
+        metal(steel, 0.10, 7),
+    ]
     tubes = [Tube(ring(np.zeros(3), [0, 0, 1], 0.62), section(0.075), metal(steel, 0.15, 8), (256, 40), 256)]
     for i in range(8):
         out, side, up = np.eye(3) @ trimesh.transformations.rotation_matrix(TAU * i / 8, [0, 0, 1])[:3, :3].T

@@ -7,12 +7,11 @@ from functools import partial
 
 import reference
 import torch
-from torch import Tensor
-
 from splitnerf.ops import HashGridSpec, hash_encode
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
 from splitnerf_tools.bench.subjects import drjit_ready
+from torch import Tensor
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
 TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
@@ -95,9 +94,15 @@ class DrJitHashGrid:
 
         self.drjit, kind = drjit, getattr(ad, storage)
         self.grid = HashGridEncoding(
-            kind, 3, n_levels=spec.n_levels, n_features_per_level=spec.n_features, hashmap_size=2**spec.log2_table_size,
-            base_resolution=spec.base_resolution, per_level_scale=spec.growth, init_scale=0.1,
-        )  # fmt: skip
+            kind,
+            3,
+            n_levels=spec.n_levels,
+            n_features_per_level=spec.n_features,
+            hashmap_size=2**spec.log2_table_size,
+            base_resolution=spec.base_resolution,
+            per_level_scale=spec.growth,
+            init_scale=0.1,
+        )
         self.positions = ad.ArrayXf(positions.T.contiguous().numpy())
         self.cotangent = [kind(column.numpy()) for column in cotangent.T.contiguous()]
         drjit.eval(self.positions, self.cotangent, self.grid.data)

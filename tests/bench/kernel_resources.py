@@ -78,7 +78,9 @@ def compiler_says(source: Path, folder: Path) -> str:
         file.write_text((ROOT / "cpp/cuda/bodies.cu.in").read_text().replace("@header@", source.name))
     flags = ["-fmad=false"] if source.name in AS_ON_THE_CPU else []
     command = ["nvcc", "-std=c++17", f"-arch={ARCHITECTURE}", f"-I{ROOT}/cpp/include", f"-I{ROOT}/cpp/cuda", *flags]
-    done = subprocess.run([*command, "-Xptxas", "-v", "-cubin", "-o", os.devnull, str(file)], capture_output=True, text=True)
+    done = subprocess.run(
+        [*command, "-Xptxas", "-v", "-cubin", "-o", os.devnull, str(file)], capture_output=True, text=True
+    )
     if done.returncode:
         raise RuntimeError(f"{source.name}: {done.stderr[-2000:]}")
     return subprocess.run(["c++filt"], input=done.stderr, capture_output=True, text=True, check=True).stdout

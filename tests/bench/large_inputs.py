@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
-
 from splitnerf.relight.cameras import look_at
 
 WIDTH, HEIGHT, FOCAL = 4000, 3000, 4200.0
@@ -97,7 +96,18 @@ def unnamed_file(process: int) -> float:
 
 def measure(data: Path, run: Path, budget: float | None) -> Row:
     """Trains until the last step and ends the process."""
-    command = [sys.executable, "-m", "splitnerf.train", str(data), "--out", str(run), "--steps", "100000", "--eval-mode", "all"]
+    command = [
+        sys.executable,
+        "-m",
+        "splitnerf.train",
+        str(data),
+        "--out",
+        str(run),
+        "--steps",
+        "100000",
+        "--eval-mode",
+        "all",
+    ]
     command += [] if budget is None else ["--max-memory", str(budget)]
     started = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -107,7 +117,9 @@ def measure(data: Path, run: Path, budget: float | None) -> Row:
         while not lines or lines[-1]["step"] < STEPS:
             time.sleep(0.1)
             if process.poll() is not None or (first is None and time.monotonic() - started > TIMEOUT):
-                raise SystemExit(f"{data}: the training ended before its first step; run the command alone: {' '.join(command)}")
+                raise SystemExit(
+                    f"{data}: the training ended before its first step; run the command alone: {' '.join(command)}"
+                )
             log = run / "metrics.jsonl"
             text = log.read_text() if log.is_file() else ""
             lines = [json.loads(line) for line in text.splitlines() if line.endswith("}")]
@@ -125,7 +137,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--photos", type=int, nargs="+", default=[100, 300, 1000])
     parser.add_argument("--max-memory", type=float, nargs="+", default=[None], metavar="GB")
-    parser.add_argument("--folder", type=Path, default=None, help="where data are written for the time of the measurement")
+    parser.add_argument(
+        "--folder", type=Path, default=None, help="where data are written for the time of the measurement"
+    )
     args = parser.parse_args()
     print("| photos | --max-memory | to the first step | memory | file | step |\n|---|---|---|---|---|---|", flush=True)
     if args.folder is not None:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.environment import read_environment
@@ -48,11 +47,17 @@ ROWS = (
 SOURCES = ("tests/bench/limits.py", "tests/bench/swap.py", "python/splitnerf/evaluate")
 QUIET_FLOOR = 1e-5  # least squared error that is told from noise
 COLUMNS = (
-    ("relit", "relit, dB"), ("relit_quiet", "less noise"), ("relit_raw", "without scale"),
-    ("novel", "novel, our light"), ("novel_true", "true light"),
-    ("albedo", "albedo, dB"), ("roughness", "roughness"), ("metallic", "metal"), ("shading", "shading normals, deg"),
+    ("relit", "relit, dB"),
+    ("relit_quiet", "less noise"),
+    ("relit_raw", "without scale"),
+    ("novel", "novel, our light"),
+    ("novel_true", "true light"),
+    ("albedo", "albedo, dB"),
+    ("roughness", "roughness"),
+    ("metallic", "metal"),
+    ("shading", "shading normals, deg"),
     ("smooth", "mesh's normals, deg"),
-)  # fmt: skip
+)
 INTRODUCTION = """# What limits the relit images
 
 Parts of reconstructed assets are replaced by the truth at the nearest surface point, and every variant is path traced

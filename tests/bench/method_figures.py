@@ -1,12 +1,12 @@
 """The figures of docs/method.md, drawn with the operators themselves.
 
-    python tests/bench/method_figures.py [--out docs/figures]        (make figures)
+python tests/bench/method_figures.py [--out docs/figures]        (make figures)
 
-    method_neus.png        distance, opacity and weights of samples along a ray, for two sharpnesses
-    method_levels.png      what a hash grid can hold while its levels open
-    method_light.png       the pre-integrated light of the demo's sky, by roughness
-    method_lobe.png        the lobe of a rough metal, its mirror direction and its mean direction
-    method_occlusion.png   occlusion factors on a plane below a ball, and the closed form
+method_neus.png        distance, opacity and weights of samples along a ray, for two sharpnesses
+method_levels.png      what a hash grid can hold while its levels open
+method_light.png       the pre-integrated light of the demo's sky, by roughness
+method_lobe.png        the lobe of a rough metal, its mirror direction and its mean direction
+method_occlusion.png   occlusion factors on a plane below a ball, and the closed form
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import splitnerf.ops as ops
 import torch
 import trimesh
-
-import splitnerf.ops as ops
 from splitnerf.data.environment import directions_of_texels
 from splitnerf_tools.demo.scene import build_environment
 
@@ -82,7 +81,9 @@ def levels(size: int = 160) -> plt.Figure:
     counts = (2, 4, 6, 8)
     figure, axes = plt.subplots(1, 1 + len(counts), figsize=(10, 2.4))
     for axis, count in zip(axes[1:], counts):
-        grid = ops.HashGrid(ops.HashGridSpec(n_levels=8, n_features=2, base_resolution=4, growth=1.7, log2_table_size=15))
+        grid = ops.HashGrid(
+            ops.HashGridSpec(n_levels=8, n_features=2, base_resolution=4, growth=1.7, log2_table_size=15)
+        )
         grid.n_active = count
         linear = torch.nn.Linear(16, 1)
         optimiser = torch.optim.Adam([*grid.parameters(), *linear.parameters()], lr=0.02)
@@ -103,7 +104,9 @@ def levels(size: int = 160) -> plt.Figure:
 def light(height: int = 48) -> plt.Figure:
     """g(w, rho) of the demo's sky as panoramas."""
     sky = torch.from_numpy(build_environment(96, 192)).double()
-    around, areas = (torch.from_numpy(x.copy()).reshape(len(sky) * 2 * len(sky), -1) for x in directions_of_texels(len(sky)))
+    around, areas = (
+        torch.from_numpy(x.copy()).reshape(len(sky) * 2 * len(sky), -1) for x in directions_of_texels(len(sky))
+    )
     asked = torch.from_numpy(directions_of_texels(height)[0]).reshape(-1, 3)
     values = (0.1, 0.3, 0.6, 1.0)
     figure, axes = plt.subplots(1, 1 + len(values), figsize=(12, 1.6))
@@ -169,8 +172,12 @@ def occlusion(size: int = 96) -> plt.Figure:
         axis.set_title(title, fontsize=10)
     line = torch.linspace(-2, 2, 201)
     far = line**2 + height**2
-    axes[2].plot(line, 1 - 0.25 / far * (height / far.sqrt()), color="black", linewidth=1, label=r"$1 - (r/l)^2 \cos\theta$")
-    axes[2].plot(ticks, o_d.reshape(size, size)[size // 2], ".", color=BLUE, markersize=4, label="$o_d$, 512 rays a point")
+    axes[2].plot(
+        line, 1 - 0.25 / far * (height / far.sqrt()), color="black", linewidth=1, label=r"$1 - (r/l)^2 \cos\theta$"
+    )
+    axes[2].plot(
+        ticks, o_d.reshape(size, size)[size // 2], ".", color=BLUE, markersize=4, label="$o_d$, 512 rays a point"
+    )
     axes[2].set_xlabel("place on the plane")
     axes[2].legend(loc="upper center", frameon=False, fontsize=8)
     return figure

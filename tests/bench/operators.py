@@ -1,6 +1,6 @@
 """Pages of docs/benchmarks on single operators: what they cost against plain torch, and what the split sum costs in error.
 
-    python tests/bench/operators.py [hash_grid|shading|split_sum] [--quick] [--out docs/benchmarks]
+python tests/bench/operators.py [hash_grid|shading|split_sum] [--quick] [--out docs/benchmarks]
 """
 
 from __future__ import annotations
@@ -17,11 +17,15 @@ def main() -> None:
     from splitnerf_tools.bench.harness import run_benchmarks
 
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("name", nargs="?", choices=NAMES, metavar="NAME", help=f"one of {', '.join(NAMES)} (default: all)")
+    parser.add_argument(
+        "name", nargs="?", choices=NAMES, metavar="NAME", help=f"one of {', '.join(NAMES)} (default: all)"
+    )
     parser.add_argument("--quick", action="store_true", help="small inputs and few rounds")
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks"))
     args = parser.parse_args()
-    for path in run_benchmarks([f"bench.{name}" for name in ([args.name] if args.name else NAMES)], args.quick, args.out, print):
+    for path in run_benchmarks(
+        [f"bench.{name}" for name in ([args.name] if args.name else NAMES)], args.quick, args.out, print
+    ):
         print(path)
 
 

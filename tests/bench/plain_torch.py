@@ -21,8 +21,6 @@ import time
 from pathlib import Path
 
 import torch
-from torch import Tensor
-
 from splitnerf.config import Config, parse_setting
 from splitnerf.fields.sdf import SOFTPLUS_BETA, SdfField, SdfSample
 from splitnerf.ops import hash_grid as hash_module
@@ -32,11 +30,12 @@ from splitnerf.ops import monte_carlo as monte_carlo_module
 from splitnerf.ops import rays as rays_module
 from splitnerf.ops import shading as shading_module
 from splitnerf.ops import visibility as visibility_module
+from splitnerf.pipeline import load_run, load_splits
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.pipeline import load_run, load_splits
+from torch import Tensor
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import reference  # noqa: E402
@@ -97,8 +96,11 @@ def stacked(losses):
 
 REPLACED = {
     rays_module: dict(
-        march_rays=reference.march_rays, surface_weights=reference.surface_weights, composite=reference.composite,
-        spread_samples=spread_samples, interpolate=lambda values, first, second, share: values,
+        march_rays=reference.march_rays,
+        surface_weights=reference.surface_weights,
+        composite=reference.composite,
+        spread_samples=spread_samples,
+        interpolate=lambda values, first, second, share: values,
         interpolate_backward=lambda grad, first, second, share, shaded: grad,
     ),
     losses_module: dict(
@@ -108,15 +110,14 @@ REPLACED = {
     ),
     shading_module: dict(light_queries=reference.light_queries, split_sum_shade=reference.split_sum_shade),
     monte_carlo_module: dict(
-        monte_carlo_light=reference.monte_carlo_light, summed_light=reference.summed_light,
+        monte_carlo_light=reference.monte_carlo_light,
+        summed_light=reference.summed_light,
         shade_sums=reference.shade_sums,
     ),
     pyramid_module: dict(sparse_product=reference.sparse_product, light_lookup=reference.light_lookup),
-    visibility_module: dict(
-        cached_occlusion=reference.cached_occlusion, cached_visibility=reference.cached_visibility
-    ),
+    visibility_module: dict(cached_occlusion=reference.cached_occlusion, cached_visibility=reference.cached_visibility),
     hash_module: dict(hash_encode=reference.hash_encode),
-}  # fmt: skip
+}
 
 
 def use_plain_torch() -> None:

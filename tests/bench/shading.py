@@ -7,18 +7,22 @@ from collections.abc import Callable
 
 import reference
 import torch
-from torch import Tensor
-from torch.nn import functional as F
-
 from splitnerf.notes import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
+from torch import Tensor
+from torch.nn import functional as F
 
 TOLERANCE = 1e-3  # error of results and gradients, relative to the largest value
 FLOATS_A_POINT = 23 + 3  # read forward and written
-SOURCES = ("cpp/*split_sum*", "cpp/*shad*", "cpp/*prefilter*", "python/splitnerf/ops/shading.py",
-           "python/splitnerf/ops/light.py")  # fmt: skip
+SOURCES = (
+    "cpp/*split_sum*",
+    "cpp/*shad*",
+    "cpp/*prefilter*",
+    "python/splitnerf/ops/shading.py",
+    "python/splitnerf/ops/light.py",
+)
 FLOATS_BACK = 26 + 23  # read backward and written
 
 
@@ -94,8 +98,17 @@ def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[
 
 def shading_inputs(n: int) -> tuple[Tensor, ...]:
     normals, views = (F.normalize(torch.randn(n, 3), dim=1) for _ in range(2))
-    return (normals, views, torch.rand(n, 3), torch.rand(n, 1), torch.rand(n, 1), torch.rand(n, 3), torch.rand(n, 3),
-            torch.rand(n, 3), torch.rand(n, 3))  # fmt: skip
+    return (
+        normals,
+        views,
+        torch.rand(n, 3),
+        torch.rand(n, 1),
+        torch.rand(n, 1),
+        torch.rand(n, 3),
+        torch.rand(n, 3),
+        torch.rand(n, 3),
+        torch.rand(n, 3),
+    )
 
 
 def checked(

@@ -90,13 +90,18 @@ def write_tables(out: Path, rows: list[Row]) -> None:
     facts = provenance(SOURCES) | {"commit": oldest["commit"], "date": oldest["date"][:10]}
     write_csv(out / "shapes.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
     lines = [
-        "# Hollow shapes", "", header(facts), "",
+        "# Hollow shapes",
+        "",
+        header(facts),
+        "",
         "`splitnerf train` on the shapes that `splitnerf synth --shape` renders, for the minutes named. Images: width,",
         "train + test views, paths a pixel, light. Chamfer: in radii of the sphere around the shape. F-score: at 1 %",
-        "of the bounding box's diagonal. [results.md](../results.md) defines the others.", "",
-        "| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS),
+        "of the bounding box's diagonal. [results.md](../results.md) defines the others.",
+        "",
+        "| " + " | ".join(COLUMNS) + " |",
+        "|" + " --- |" * len(COLUMNS),
         *("| " + " | ".join(row[column] or "-" for column in COLUMNS) + " |" for row in rows),
-    ]  # fmt: skip
+    ]
     with atomic_path(out / "shapes.md") as temporary:
         temporary.write_text("\n".join(lines) + "\n")
 

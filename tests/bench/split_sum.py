@@ -6,25 +6,24 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+from reference import drawn_directions
 from scipy import ndimage
-from torch import Tensor
-from torch.nn import functional as F
-
 from splitnerf import _core
 from splitnerf.ops import (
     QUERIES,
     LightSums,
-    monte_carlo_light,
     light_queries,
+    monte_carlo_light,
     shade_sums,
     split_sum_shade,
     summed_light,
 )
 from splitnerf_tools.bench.charts import Chart, Point, Result
 from splitnerf_tools.bench.harness import rms
-from splitnerf_tools.bench.subjects import MapLight, lights
 from splitnerf_tools.bench.prefilter import Truth
-from reference import drawn_directions
+from splitnerf_tools.bench.subjects import MapLight, lights
+from torch import Tensor
+from torch.nn import functional as F
 
 ROUGHNESS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 COSINES = (0.1, 0.5, 0.9)  # n.v
@@ -35,8 +34,13 @@ N_NORMALS = 64
 GROUPS = 4  # groups of samples of the truth
 LAMP_SHARE = 5e-4  # share of the texels, the brightest ones, that count as lamps
 PARTS = 4  # parts of a lamp's texel along its edge
-SOURCES = ("cpp/*split_sum*", "cpp/*brdf_lut*", "cpp/*monte_carlo*", "python/splitnerf/ops/shading.py",
-           "python/splitnerf/ops/monte_carlo.py")  # fmt: skip
+SOURCES = (
+    "cpp/*split_sum*",
+    "cpp/*brdf_lut*",
+    "cpp/*monte_carlo*",
+    "python/splitnerf/ops/shading.py",
+    "python/splitnerf/ops/monte_carlo.py",
+)
 NOISE = "noise"
 KARIS = "Karis 2014, fit"
 

@@ -12,7 +12,6 @@ from collections.abc import Collection
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export.bake import Spread, Texels, rasterise, to_tangent_space
@@ -69,9 +68,7 @@ def surface_values(asset: Asset, triangles: np.ndarray, weights: np.ndarray) -> 
             tangent, normal = at(asset.tangents)[here], normals[here]
             bitangent = np.sign(tangent[:, 3:]) * np.cross(normal, tangent[:, :3])
             normals[here] = tangent[:, :3] * mapped[:, :1] + bitangent * mapped[:, 1:2] + normal * mapped[:, 2:]
-    return {
-        "albedo": albedo, "roughness": rough_metal[:, :1], "metallic": rough_metal[:, 1:], "normals": unit(normals)
-    }  # fmt: skip
+    return {"albedo": albedo, "roughness": rough_metal[:, :1], "metallic": rough_metal[:, 1:], "normals": unit(normals)}
 
 
 class NearestPoints:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-
 from splitnerf.data.asset import Asset, Material
 
 TAU = 2 * np.pi
@@ -75,8 +74,12 @@ def assemble(name: str, tubes: list[Tube], detail: float) -> Asset:
         vertices, triangles, normals = [*vertices, points], [*triangles, faces + start], [*normals, shading]
         start += len(points)
     faces = np.concatenate(triangles).astype(np.int32)
-    material = Material(name, metallic=1.0, albedo_texture=np.clip(albedo, 0, 1).astype(np.float32),
-                        roughness_metallic_texture=np.clip(orm, 0, 1).astype(np.float32))  # fmt: skip
+    material = Material(
+        name,
+        metallic=1.0,
+        albedo_texture=np.clip(albedo, 0, 1).astype(np.float32),
+        roughness_metallic_texture=np.clip(orm, 0, 1).astype(np.float32),
+    )
     vertices, normals, uv = (np.concatenate(part).astype(np.float32) for part in (vertices, normals, uv))
     return Asset(name, vertices, faces, normals, np.zeros(len(faces), np.int32), [material], uv)
 

@@ -125,8 +125,8 @@ Encoding encode(const HashGridShape& shape, int n_active, const std::vector<doub
   const size_t n = x.size() / 3, columns = size_t(shape.n_levels * shape.n_features);
   Encoding e{std::vector<double>(n * columns, -7), std::vector<double>(3 * n * columns, -7)};
   const std::vector<HashLevel> levels = levels_of(shape);
-  const HashEncodeArgs<double> args{levels.data(), shape.n_features, shape.n_levels, n_active, int64_t(n), x.data(),
-                                    table.data()};
+  const HashEncodeArgs<double> args{levels.data(), shape.n_features, shape.n_levels, n_active,
+                                    int64_t(n),    x.data(),         table.data()};
   kernels<double>().hash_encode(args, 0, args.n_points, e.features.data(), e.jacobian.data());
   return e;
 }

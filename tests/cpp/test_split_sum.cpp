@@ -70,8 +70,8 @@ TEST(BrdfTable, EntriesFollowAFinerQuadrature) {
     for (int column = 0; column < kLutSize; ++column) {
       const LobeIntegrals fine = integrate_brdf(square(column / (kLutSize - 1.0)), row / (kLutSize - 1.0), 1 << 16);
       const float* entry = brdf_lut() + (row * kLutSize + column) * kLutChannels;
-      worst = std::max({worst, std::abs(entry[0] - fine.f1), std::abs(entry[1] - fine.f2),
-                        std::abs(entry[3] - fine.dielectric)});
+      worst = std::max(
+          {worst, std::abs(entry[0] - fine.f1), std::abs(entry[1] - fine.f2), std::abs(entry[3] - fine.dielectric)});
       worst_chi = std::max(worst_chi, std::abs(entry[2] - fine.chi));
     }
   }
@@ -97,8 +97,8 @@ TEST(BrdfTable, DerivativesFollowTheValues) {
     std::vector<double> x{random.uniform(0.01, 1), random.uniform()};
     const LutSample<double> s = sample_brdf_lut(brdf_lut(), x[0], x[1]);
     for (int c = 0; c < 3; ++c)
-      expect_gradient([&] { return sample_brdf_lut(brdf_lut(), x[0], x[1]).value[c]; }, x, {s.d_n_dot_v[c], s.d_roughness[c]},
-                      1e-6, "table", 1e-6 * x[0]);
+      expect_gradient([&] { return sample_brdf_lut(brdf_lut(), x[0], x[1]).value[c]; }, x,
+                      {s.d_n_dot_v[c], s.d_roughness[c]}, 1e-6, "table", 1e-6 * x[0]);
     expect_gradient([&] { return sample_brdf_lut(brdf_lut(), x[0], x[1]).dielectric; }, x,
                     {s.dielectric_by_n_dot_v, s.dielectric_by_roughness}, 1e-6, "dielectric", 1e-6 * x[0]);
   }
@@ -198,18 +198,18 @@ TEST(Shading, AdjointFollowsCentralDifferences) {
         std::copy(directions.begin(), directions.end(), x.begin());
         std::vector<double> gradient(x.size()), radiance(3 * n);
         const auto arrays = [&](auto* p) {
-          return ShadeArrays<std::remove_pointer_t<decltype(p)>>{
-              p + at[0], p + at[1], p + at[2], p + at[3], p + at[4], p + at[5], p + at[6], p + at[7], p + at[8],
-              nullptr,   nullptr};
+          return ShadeArrays<std::remove_pointer_t<decltype(p)>>{p + at[0], p + at[1], p + at[2], p + at[3],
+                                                                 p + at[4], p + at[5], p + at[6], p + at[7],
+                                                                 p + at[8], nullptr,   nullptr};
         };
         const auto f = [&] {
           cpu::run(n, ShadeBody<double>{brdf_lut(), options, channels, arrays(static_cast<const double*>(x.data())),
                                         radiance.data()});
           return inner(g, radiance);
         };
-        cpu::run(n, ShadeBackwardBody<double>{brdf_lut(), options, channels,
-                                              arrays(static_cast<const double*>(x.data())), g.data(),
-                                              arrays(gradient.data())});
+        cpu::run(n,
+                 ShadeBackwardBody<double>{brdf_lut(), options, channels, arrays(static_cast<const double*>(x.data())),
+                                           g.data(), arrays(gradient.data())});
         const std::string what = "mode " + std::to_string(int(mode)) + " compensate " + std::to_string(compensate) +
                                  " channels " + std::to_string(channels);
         expect_gradient(f, x, gradient, 1e-6, what.c_str(), 1e-6);
@@ -226,9 +226,9 @@ TEST(Shading, FloatFollowsDouble) {
     p.indirect_s = {random.uniform(), 0, 2}, p.indirect_d = {0, random.uniform(), 1};
     ShadePoint<float> q;
     const auto narrow = [](Vec3<double> v) { return Vec3<float>{float(v.x), float(v.y), float(v.z)}; };
-    q = {narrow(p.normal),   narrow(p.view),    narrow(p.albedo),      float(p.roughness),   float(p.metallic),
-         narrow(p.specular), narrow(p.diffuse), narrow(p.occlusion_s), narrow(p.occlusion_d),
-         narrow(p.indirect_s), narrow(p.indirect_d)};
+    q = {narrow(p.normal),      narrow(p.view),       narrow(p.albedo),    float(p.roughness),
+         float(p.metallic),     narrow(p.specular),   narrow(p.diffuse),   narrow(p.occlusion_s),
+         narrow(p.occlusion_d), narrow(p.indirect_s), narrow(p.indirect_d)};
     const Vec3<double> exact = split_sum_shade(brdf_lut(), {}, p);
     const Vec3<float> got = split_sum_shade(brdf_lut(), {}, q);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], exact[c], 2e-5);

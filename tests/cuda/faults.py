@@ -34,48 +34,140 @@ class Fault(NamedTuple):
 
 
 FAULTS = (
-    Fault("scan: no barrier before the warps' totals are read", "", CUDA + "device.cu",
-          "totals[number] = total;\n    __syncthreads();", "totals[number] = total;"),
-    Fault("scan: no barrier after they were read", "thread", CUDA + "device.cu",
-          "carried += warp.sum(of_warp);\n    __syncthreads();", "carried += warp.sum(of_warp);", "*.SampledRays"),
-    Fault("sums of a block: no barrier between its warps", "", CUDA + "launch.cuh",
-          "= sum;\n  }\n  __syncthreads();", "= sum;\n  }"),
-    Fault("light's gradient: no barrier after the tile was cleared", "thread", CUDA + "light_pyramid.cu",
-          "= T(0);\n    __syncthreads();", "= T(0);", "LightKernels.Lookup"),
-    Fault("prefilter: no barrier before the next tile is written", "", CUDA + "prefilter.cu",
-          "items[k].add(source);\n    }\n    __syncthreads();", "items[k].add(source);\n    }"),
-    Fault("field's gradient: no barrier between units and their sums", "", CUDA + "sdf_field.cu",
-          "units(layer, tile, given);\n      __syncthreads();", "units(layer, tile, given);"),
-    Fault("field's gradient: no barrier before the units' memory is used again", "", CUDA + "sdf_field.cu",
-          "units, sum);\n      });\n      __syncthreads();", "units, sum);\n      });"),
-    Fault("a warp's running sum starts with the own value in lane 0", "", CUDA + "launch.cuh",
-          "    if (lane() == 0) running = T(0);\n", ""),
-    Fault("a thread an item: one item too many", "address", CUDA + "launch.cuh",
-          "  if (i < n) body(i);\n}\ntemplate <class Body> void for_each(", "  if (i <= n) body(i);\n}\ntemplate <class Body> void for_each("),
-    Fault("field: a full tile is written where it has fewer points", "address", CUDA + "sdf_field.cu",
-          "tile.each(here * tile.n_outputs,", "tile.each(tile.points * tile.n_outputs,"),
-    Fault("a gradient that blocks share is added to without an atomic", "thread", BODIES + "accumulate.h",
-          "  atomicAdd(to, value);", "  *to += value;", "LightKernels.Lookup"),
-    Fault("walk: no barrier between a round's inputs and the network", "", BODIES + "bodies/sdf_layer.h",
-          "    group.sync();\n    const T of_part", "    const T of_part"),
-    Fault("cached visibility: only the first 32 vertices are looked at", "", BODIES + "bodies/visibility_cache.h",
-          "first < total; first += Group::size", "first < total && first == 0; first += Group::size"),
-    Fault("summed light's gradient: no barrier before the copies are added", "", CUDA + "summed_light.cu",
-          "to_copy(Warp{}, p);\n  __syncthreads();", "to_copy(Warp{}, p);"),
-    Fault("sparse product: only one lane takes part in the sum", "", BODIES + "bodies/light_pyramid.h",
-          "    sum = sum3(group, sum);", "    if (group.lane() == 0) sum = sum3(group, sum);"),
-)  # fmt: skip
+    Fault(
+        "scan: no barrier before the warps' totals are read",
+        "",
+        CUDA + "device.cu",
+        "totals[number] = total;\n    __syncthreads();",
+        "totals[number] = total;",
+    ),
+    Fault(
+        "scan: no barrier after they were read",
+        "thread",
+        CUDA + "device.cu",
+        "carried += warp.sum(of_warp);\n    __syncthreads();",
+        "carried += warp.sum(of_warp);",
+        "*.SampledRays",
+    ),
+    Fault(
+        "sums of a block: no barrier between its warps",
+        "",
+        CUDA + "launch.cuh",
+        "= sum;\n  }\n  __syncthreads();",
+        "= sum;\n  }",
+    ),
+    Fault(
+        "light's gradient: no barrier after the tile was cleared",
+        "thread",
+        CUDA + "light_pyramid.cu",
+        "= T(0);\n    __syncthreads();",
+        "= T(0);",
+        "LightKernels.Lookup",
+    ),
+    Fault(
+        "prefilter: no barrier before the next tile is written",
+        "",
+        CUDA + "prefilter.cu",
+        "items[k].add(source);\n    }\n    __syncthreads();",
+        "items[k].add(source);\n    }",
+    ),
+    Fault(
+        "field's gradient: no barrier between units and their sums",
+        "",
+        CUDA + "sdf_field.cu",
+        "units(layer, tile, given);\n      __syncthreads();",
+        "units(layer, tile, given);",
+    ),
+    Fault(
+        "field's gradient: no barrier before the units' memory is used again",
+        "",
+        CUDA + "sdf_field.cu",
+        "units, sum);\n      });\n      __syncthreads();",
+        "units, sum);\n      });",
+    ),
+    Fault(
+        "a warp's running sum starts with the own value in lane 0",
+        "",
+        CUDA + "launch.cuh",
+        "    if (lane() == 0) running = T(0);\n",
+        "",
+    ),
+    Fault(
+        "a thread an item: one item too many",
+        "address",
+        CUDA + "launch.cuh",
+        "  if (i < n) body(i);\n}\ntemplate <class Body> void for_each(",
+        "  if (i <= n) body(i);\n}\ntemplate <class Body> void for_each(",
+    ),
+    Fault(
+        "field: a full tile is written where it has fewer points",
+        "address",
+        CUDA + "sdf_field.cu",
+        "tile.each(here * tile.n_outputs,",
+        "tile.each(tile.points * tile.n_outputs,",
+    ),
+    Fault(
+        "a gradient that blocks share is added to without an atomic",
+        "thread",
+        BODIES + "accumulate.h",
+        "  atomicAdd(to, value);",
+        "  *to += value;",
+        "LightKernels.Lookup",
+    ),
+    Fault(
+        "walk: no barrier between a round's inputs and the network",
+        "",
+        BODIES + "bodies/sdf_layer.h",
+        "    group.sync();\n    const T of_part",
+        "    const T of_part",
+    ),
+    Fault(
+        "cached visibility: only the first 32 vertices are looked at",
+        "",
+        BODIES + "bodies/visibility_cache.h",
+        "first < total; first += Group::size",
+        "first < total && first == 0; first += Group::size",
+    ),
+    Fault(
+        "summed light's gradient: no barrier before the copies are added",
+        "",
+        CUDA + "summed_light.cu",
+        "to_copy(Warp{}, p);\n  __syncthreads();",
+        "to_copy(Warp{}, p);",
+    ),
+    Fault(
+        "sparse product: only one lane takes part in the sum",
+        "",
+        BODIES + "bodies/light_pyramid.h",
+        "    sum = sum3(group, sum);",
+        "    if (group.lane() == 0) sum = sum3(group, sum);",
+    ),
+)
 
 
 def build(finder: str) -> Path:
     """Builds the tests with a sanitizer; the path of their program."""
     folder = WORK / (finder or "plain")
     subprocess.run(
-        ["cmake", "-S", WORK / "source", "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
-         "-DSPLITNERF_BUILD_PYTHON=OFF", "-DSPLITNERF_BUILD_TESTS=ON", f"-DSPLITNERF_SANITIZE={finder}"],
-        check=True, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
-    subprocess.run(["cmake", "--build", folder, "--target", "splitnerf_cuda_tests"], check=True, stdout=subprocess.DEVNULL)
+        [
+            "cmake",
+            "-S",
+            WORK / "source",
+            "-B",
+            folder,
+            "-G",
+            "Ninja",
+            "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
+            "-DSPLITNERF_BUILD_PYTHON=OFF",
+            "-DSPLITNERF_BUILD_TESTS=ON",
+            f"-DSPLITNERF_SANITIZE={finder}",
+        ],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    subprocess.run(
+        ["cmake", "--build", folder, "--target", "splitnerf_cuda_tests"], check=True, stdout=subprocess.DEVNULL
+    )
     return folder / "tests" / "splitnerf_cuda_tests"
 
 
@@ -112,7 +204,9 @@ def main() -> int:
             path = WORK / "source" / fault.file
             right = path.read_text()
             if right.count(fault.old) != 1:
-                sys.exit(f"faults.py: {fault.file} has the text of '{fault.name}' {right.count(fault.old)} times, not once")
+                sys.exit(
+                    f"faults.py: {fault.file} has the text of '{fault.name}' {right.count(fault.old)} times, not once"
+                )
             path.write_text(right.replace(fault.old, fault.new))
             found = first_finding(build(finder), fault.tests)
             path.write_text(right)

@@ -348,8 +348,8 @@ template <class T> void check_adamw(double tolerance, int64_t rows, int64_t colu
                          m1.data(), v1.data(), half1.data(), bfloat1.data()};
   AdamwListBody<T> here, there;
   here.add({rule, x});
-  there.add({rule,
-             {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}});
+  there.add(
+      {rule, {n, columns, sparse, param2.data(), grad.data(), m2.data(), v2.data(), half2.data(), bfloat2.data()}});
   cpu::run(n, here);
   on_gpu(n, there);
   expect_near(param2, param1, tolerance), expect_near(m2, m1, tolerance), expect_near(v2, v1, tolerance);

@@ -106,8 +106,8 @@ TEST(GroupKernels, CompositeAndItsGradients) {
       launch(CompositeBackwardBody<double>{in, g.data(), out[1].data(), out[2].data(), out[3].data()});
       return out;
     };
-    const auto a = run([&](const auto&body) { cpu::run(in.rays.n_rays, body); }),
-               b = run([&](const auto&body) { on_gpu(in.rays.n_rays, body); });
+    const auto a = run([&](const auto& body) { cpu::run(in.rays.n_rays, body); }),
+               b = run([&](const auto& body) { on_gpu(in.rays.n_rays, body); });
     expect_near(b[0], a[0], 1e-14), expect_near(b[1], a[1], 0), expect_near(b[2], a[2], 0);
     expect_near(b[3], a[3], 1e-14);
   }

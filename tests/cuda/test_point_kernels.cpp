@@ -137,7 +137,8 @@ TEST(PointKernels, DrawnRays) {
                                   numbers + n});
       return out;
     };
-    const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+    const auto a = run([&](const auto& body) { cpu::run(n, body); }),
+               b = run([&](const auto& body) { on_gpu(n, body); });
     expect_near(b.first, a.first, 1e-14);
     EXPECT_EQ(b.second, a.second);
   }
@@ -172,7 +173,7 @@ template <class Code> void compare_read_pixels(int64_t n) {
     std::copy(whole.get(), whole.get() + n, out.second.begin());
     return out;
   };
-  const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+  const auto a = run([&](const auto& body) { cpu::run(n, body); }), b = run([&](const auto& body) { on_gpu(n, body); });
   expect_near(b.first, a.first, 0);
   EXPECT_EQ(b.second, a.second);
 }
@@ -199,8 +200,8 @@ TEST(PointKernels, LightQueries) {
                                                 g_rho.data(), p + 8 * n, p + 11 * n});
         return out;
       };
-      const auto a = run([&](const auto&body) { cpu::run(n, body); }),
-                 b = run([&](const auto&body) { on_gpu(n, body); });
+      const auto a = run([&](const auto& body) { cpu::run(n, body); }),
+                 b = run([&](const auto& body) { on_gpu(n, body); });
       expect_near(b, a, 1e-13);
     }
 }

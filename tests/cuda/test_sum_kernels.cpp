@@ -33,8 +33,8 @@ TEST(SumKernels, PixelLosses) {
           launch(PixelLossesBackwardBody<double>{in, grad, out[1].data(), out[2].data()});
           return out;
         };
-        const auto a = run([&](const auto&body) { cpu::run(n, body); }),
-                   b = run([&](const auto&body) { on_gpu(n, body); });
+        const auto a = run([&](const auto& body) { cpu::run(n, body); }),
+                   b = run([&](const auto& body) { on_gpu(n, body); });
         for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
       }
     }
@@ -77,7 +77,8 @@ TEST(SumKernels, LossesOfTheLight) {
       launch(LightPriorBackwardBody<double>{levels, &grad, out[1].data()});
       return out;
     };
-    const auto a = run([&](const auto&body) { cpu::run(n, body); }), b = run([&](const auto&body) { on_gpu(n, body); });
+    const auto a = run([&](const auto& body) { cpu::run(n, body); }),
+               b = run([&](const auto& body) { on_gpu(n, body); });
     for (size_t k = 0; k < a.size(); ++k) expect_near(b[k], a[k], 1e-13);
   }
 }

@@ -28,19 +28,18 @@ from pathlib import Path
 import atheris
 import numpy as np
 import torch
-
-from splitnerf.training.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import read_frames
-from splitnerf.data.layouts.transforms import read_camera_path
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image, read_radiance, write_image
+from splitnerf.data.layouts.transforms import read_camera_path
 from splitnerf.errors import InputError
 from splitnerf.export.glb import write_glb
 from splitnerf.render.model import SceneModel
+from splitnerf.training.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
 from splitnerf.training.schedule import make_optimiser
 
 DEFAULTS = {"-rss_limit_mb": "3000", "-timeout": "20", "-max_len": "65536"}
@@ -128,7 +127,7 @@ class ColmapReader(Reader):
             struct.pack("<Q", 6) + b"".join(binary),
             f"# cameras\n{camera} RADIAL {w} {h} 20 8 8 0.1 0.01\n".encode(),
             "".join(" ".join(map(str, image)) + "\n1 2 -1\n" for image in images).encode(),
-        ]  # fmt: skip
+        ]
 
     def corpus(self) -> list[bytes]:
         return [bytes([i]) + part for i, part in enumerate(self.parts)]
@@ -219,10 +218,14 @@ class GlbReader(Reader):
         normals = corners - 0.25
         texture = np.full((4, 4, 3), 0.5, np.float32)
         asset = Asset(
-            "seed", corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
-            (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32), np.zeros(4, np.int32),
-            [Material(albedo_texture=texture)], uv=corners[:, :2].copy(),
-        )  # fmt: skip
+            "seed",
+            corners,
+            np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
+            (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32),
+            np.zeros(4, np.int32),
+            [Material(albedo_texture=texture)],
+            uv=corners[:, :2].copy(),
+        )
         write_glb(self.folder / "seed.glb", asset)
         raw = (self.folder / "seed.glb").read_bytes()
         length = struct.unpack_from("<I", raw, 12)[0]
@@ -241,23 +244,43 @@ class CheckpointReader(Reader):
     """Raw files, and a pickle among the parts of a valid container; what loads goes into a model and its optimiser."""
 
     def corpus(self) -> list[bytes]:
-        config = Config().replace({
-            "n_levels": 2, "log2_table_size": 4, "base_resolution": 2, "light_resolution": 16, "grid_resolution": 2,
-            "constants.surface_width": 4, "constants.materials_width": 4, "start_levels": 2,
-        })  # fmt: skip
+        config = Config().replace(
+            {
+                "n_levels": 2,
+                "log2_table_size": 4,
+                "base_resolution": 2,
+                "light_resolution": 16,
+                "grid_resolution": 2,
+                "constants.surface_width": 4,
+                "constants.materials_width": 4,
+                "start_levels": 2,
+            }
+        )
         model = SceneModel(config)
         optimiser = make_optimiser(model, config)
         for parameter in model.parameters():
             parameter.grad = torch.ones_like(parameter)
         optimiser.step()
         save_checkpoint(
-            self.folder / "seed.pt", config=config, fingerprint="0", state=dict(
-                step=1, seconds=1.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, model=model.state_dict(),
-                optimiser=optimiser.state_dict(), generator=torch.Generator().get_state(),
-                torch_generator=torch.get_rng_state(), occupancy=torch.zeros(8), box_from_world=torch.eye(4).double(),
-                mesh_vertices=torch.eye(3), mesh_faces=torch.tensor([[0, 1, 2]]),
+            self.folder / "seed.pt",
+            config=config,
+            fingerprint="0",
+            state=dict(
+                step=1,
+                seconds=1.0,
+                n_rays=64,
+                meshed_at=0.0,
+                previewed_at=0.0,
+                model=model.state_dict(),
+                optimiser=optimiser.state_dict(),
+                generator=torch.Generator().get_state(),
+                torch_generator=torch.get_rng_state(),
+                occupancy=torch.zeros(8),
+                box_from_world=torch.eye(4).double(),
+                mesh_vertices=torch.eye(3),
+                mesh_faces=torch.tensor([[0, 1, 2]]),
             ),
-        )  # fmt: skip
+        )
         raw = (self.folder / "seed.pt").read_bytes()
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             self.parts = {entry.filename: archive.read(entry) for entry in archive.infolist()}
@@ -280,9 +303,15 @@ class CheckpointReader(Reader):
 
 
 READERS = {
-    "json": JsonReader, "colmap": ColmapReader, "neus": NeusReader, "png": PngReader, "exr": ExrReader, "hdr": HdrReader, "glb": GlbReader,
+    "json": JsonReader,
+    "colmap": ColmapReader,
+    "neus": NeusReader,
+    "png": PngReader,
+    "exr": ExrReader,
+    "hdr": HdrReader,
+    "glb": GlbReader,
     "checkpoint": CheckpointReader,
-}  # fmt: skip
+}
 
 
 def main() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 import numpy as np
-
 from splitnerf.data.images import write_image
 
 SIZE = 48

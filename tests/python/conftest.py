@@ -9,15 +9,14 @@ import pytest
 import torch
 import trimesh
 from painted_ball import heights, photos, sky, textured
-from tiny_runs import tiny
-from viewer_server import numbered_sky, serving, triangle
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.training.loop import train
 from splitnerf_tools.demo.scene import write_demo_dataset
+from tiny_runs import tiny
+from viewer_server import numbered_sky, serving, triangle
 
 
 def tiny_dataset(folder: Path, n_train: int) -> Path:

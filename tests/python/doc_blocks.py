@@ -80,6 +80,10 @@ def blocks_of(page: Path) -> list[Block]:
 
 def inline_commands(page: Path) -> list[list[str]]:
     """The words of each `splitnerf COMMAND ...` within the text of a page."""
-    spans = [child.content for token in MarkdownIt("commonmark").enable("table").parse(page.read_text())
-             for child in token.children or [] if child.type == "code_inline"]  # fmt: skip
+    spans = [
+        child.content
+        for token in MarkdownIt("commonmark").enable("table").parse(page.read_text())
+        for child in token.children or []
+        if child.type == "code_inline"
+    ]
     return [shlex.split(span) for span in spans if re.match(r"splitnerf [a-z]", span)]

@@ -9,7 +9,6 @@ import struct
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.images import encode_png
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
@@ -40,11 +39,13 @@ class Gltf:
         values = values.reshape(len(values), -1)
         self.json["accessors"].append(
             {
-                "bufferView": self.view(values.tobytes()), "componentType": COMPONENTS[dtype], "count": len(values),
+                "bufferView": self.view(values.tobytes()),
+                "componentType": COMPONENTS[dtype],
+                "count": len(values),
                 "type": KINDS[values.shape[1]],
             }
             | extra
-        )  # fmt: skip
+        )
         return len(self.json["accessors"]) - 1
 
     def texture(self, pixels) -> int:
@@ -86,9 +87,12 @@ class Gltf:
         binary = self.binary + b"\0" * (-len(self.binary) % 4)
         size = 12 + 8 + len(text) + 8 + len(binary)
         path.write_bytes(
-            struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text
-            + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-        )  # fmt: skip
+            struct.pack("<4sII", b"glTF", 2, size)
+            + struct.pack("<I4s", len(text), b"JSON")
+            + text
+            + struct.pack("<I4s", len(binary), b"BIN\0")
+            + binary
+        )
         return path
 
 
@@ -109,5 +113,7 @@ def beside(root: Path, uri: str) -> Path:
     (folder / "inside.bin").symlink_to("sub/the data.bin")
     os.mkfifo(folder / "pipe.bin")
     uri = uri.format(root=root, inline=base64.b64encode(asset.binary).decode())
-    (folder / "a.gltf").write_text(json.dumps(asset.json | {"buffers": [{"byteLength": len(asset.binary), "uri": uri}]}))
+    (folder / "a.gltf").write_text(
+        json.dumps(asset.json | {"buffers": [{"byteLength": len(asset.binary), "uri": uri}]})
+    )
     return folder / "a.gltf"

@@ -13,18 +13,40 @@ from torch.utils._python_dispatch import TorchDispatchMode
 
 # Kernels and memory sets of an operator with more than one, as its launcher in cpp/cuda/ and cpp/torch/ makes them.
 KERNELS = {
-    "pixel_losses": 2, "gradient_losses": 2, "gradient_losses_backward": 2, "light_prior": 2,
-    "quadratic_entropy": 4, "sdf_values": 2, "sdf_field": 2,
-    "sdf_field_backward": 5, "hash_encode_backward": 2, "light_lookup_backward": 3,
-    "summed_light_backward": 2, "prefilter_light": 2, "prefilter_light_backward": 2, "interpolate_backward": 2, "march_rays": 3,
-    "sample_rays": 6, "spread_samples": 3, "adamw_steps_": 1,
-}  # fmt: skip
+    "pixel_losses": 2,
+    "gradient_losses": 2,
+    "gradient_losses_backward": 2,
+    "light_prior": 2,
+    "quadratic_entropy": 4,
+    "sdf_values": 2,
+    "sdf_field": 2,
+    "sdf_field_backward": 5,
+    "hash_encode_backward": 2,
+    "light_lookup_backward": 3,
+    "summed_light_backward": 2,
+    "prefilter_light": 2,
+    "prefilter_light_backward": 2,
+    "interpolate_backward": 2,
+    "march_rays": 3,
+    "sample_rays": 6,
+    "spread_samples": 3,
+    "adamw_steps_": 1,
+}
 # The same where no count is waited for: `room` of samples, or a tensor with the number of candidates.
 WITH_ROOM = {"sample_rays": 7}
 NO_LAUNCH = {
-    "empty", "empty_like", "empty_strided", "new_empty", "new_empty_strided", "_unsafe_view", "_reshape_alias", "lift_fresh",
-    "_local_scalar_dense", "_record_function_enter_new", "_record_function_exit",
-}  # fmt: skip
+    "empty",
+    "empty_like",
+    "empty_strided",
+    "new_empty",
+    "new_empty_strided",
+    "_unsafe_view",
+    "_reshape_alias",
+    "lift_fresh",
+    "_local_scalar_dense",
+    "_record_function_enter_new",
+    "_record_function_exit",
+}
 # operators, and the functions whose calls are the CPU's
 ON_THE_HOST = {"_foreach_add_": "_step", "exp": "s_value", "mul": "s_value", "clamp": "s_value"}
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from blender_data import ANGLE, SIZE, poses_around, sphere_alpha
 from scipy.spatial.transform import Rotation
-
 from splitnerf.data.images import write_image
 
 FOCAL = 0.5 * SIZE / np.tan(0.5 * ANGLE)
@@ -123,10 +122,7 @@ def opencv_points(x: np.ndarray, y: np.ndarray, k: dict) -> tuple[np.ndarray, np
         bent = theta * (1 + k1 * theta**2 + k2 * theta**4 + k3 * theta**6 + k4 * theta**8)
         return bent / r * x, bent / r * y
     radial = 1 + k1 * r**2 + k2 * r**4 + k3 * r**6
-    return (
-        x * radial + 2 * p1 * x * y + p2 * (r**2 + 2 * x**2),
-        y * radial + p1 * (r**2 + 2 * y**2) + 2 * p2 * x * y,
-    )
+    return (x * radial + 2 * p1 * x * y + p2 * (r**2 + 2 * x**2), y * radial + p1 * (r**2 + 2 * y**2) + 2 * p2 * x * y)
 
 
 def seen_by_pixels(k: dict, lens: tuple, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,10 +6,9 @@ import numpy as np
 import torch
 import trimesh
 from op_checks import generator
-from torch.nn import functional as F
-
 from splitnerf import _core
 from splitnerf.ops import MeshScene, VisibilityCache
+from torch.nn import functional as F
 
 OFFSET = 0.0125
 

@@ -14,11 +14,9 @@ from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, 
 from op_checks import as_tuple, generator, lib, rand, unit
 from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
-from torch.utils._pytree import tree_map
-
 from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_averages, zonal_factors
-
+from torch.utils._pytree import tree_map
 
 # ---- the hash grid ----
 
@@ -158,8 +156,21 @@ def sample_rays_inputs(dtype=torch.float64) -> tuple:
     n = bumpy_field().to(dtype).network()
     o, d, jitter = field_rays(12, dtype)
     return (
-        o, d, jitter, full_cells(), *n._replace(n_active=2).arguments(), STEP, 64, 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25, 0,
-    )  # fmt: skip
+        o,
+        d,
+        jitter,
+        full_cells(),
+        *n._replace(n_active=2).arguments(),
+        STEP,
+        64,
+        60.0,
+        1.0,
+        0.01,
+        1e-3,
+        0.1,
+        1.25,
+        0,
+    )
 
 
 def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
@@ -172,9 +183,18 @@ def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
     beta_scale = 0.02  # around the bend of softplus_100
     levels = SDF_SPEC.arguments(2)
     return (
-        0.7 * randn(n, 3), randn(SDF_SPEC.n_entries, 2), randn(10, 9), beta_scale * (2 + randn(10, 1)), beta_scale * randn(10),
-        randn(4, 10), 2 + randn(4, 1), randn(4), 100.0, *levels, BOX,
-    )  # fmt: skip
+        0.7 * randn(n, 3),
+        randn(SDF_SPEC.n_entries, 2),
+        randn(10, 9),
+        beta_scale * (2 + randn(10, 1)),
+        beta_scale * randn(10),
+        randn(4, 10),
+        2 + randn(4, 1),
+        randn(4),
+        100.0,
+        *levels,
+        BOX,
+    )
 
 
 # ---- cached visibility ----
@@ -190,8 +210,22 @@ def cached_occlusion_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
     roughness = torch.rand(9, 1, generator=generator(2))[:n].to(dtype)
     radiance = torch.rand(len(cache.vertices) if with_hits else 0, 3, generator=generator(3)).to(dtype)
     light = torch.rand(64, 3, generator=generator(4)).to(dtype)
-    return (x, normals, lobes, roughness, cache.vertices.to(dtype), cache.normals.to(dtype), cache.starts, cache.order,
-            cache.radius, cache.bits, cache.hits, radiance, cache.directions.to(dtype), light)  # fmt: skip
+    return (
+        x,
+        normals,
+        lobes,
+        roughness,
+        cache.vertices.to(dtype),
+        cache.normals.to(dtype),
+        cache.starts,
+        cache.order,
+        cache.radius,
+        cache.bits,
+        cache.hits,
+        radiance,
+        cache.directions.to(dtype),
+        light,
+    )
 
 
 def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
@@ -204,7 +238,9 @@ def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
 
 @functools.cache
 def floor_under_a_ball() -> MeshScene:
-    return scene_of(trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))]))
+    return scene_of(
+        trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))])
+    )
 
 
 def traced_points(n: int = 9) -> tuple:
@@ -214,7 +250,16 @@ def traced_points(n: int = 9) -> tuple:
 
 
 def occlusion_inputs() -> tuple:
-    return floor_under_a_ball().handle, *traced_points(), *(rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3))), 16, 16, OFFSET, False, 3
+    return (
+        floor_under_a_ball().handle,
+        *traced_points(),
+        *(rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3))),
+        16,
+        16,
+        OFFSET,
+        False,
+        3,
+    )
 
 
 def incoming_inputs() -> tuple:
@@ -222,7 +267,11 @@ def incoming_inputs() -> tuple:
     (points, normals, views), n = traced_points(), len(trimesh.creation.icosphere(1).vertices) + 36
     materials = (rand(9, k, seed=k, dtype=torch.float32) for k in (3, 1, 1))
     maps = (rand(4, 4, k, seed=k, dtype=torch.float32) for k in (3, 2, 3))
-    surface = torch.tensor([0.0, 0, 1]).repeat(n, 1), torch.tensor([1.0, 0, 0, 1]).repeat(n, 1), rand(n, 2, dtype=torch.float32)
+    surface = (
+        torch.tensor([0.0, 0, 1]).repeat(n, 1),
+        torch.tensor([1.0, 0, 0, 1]).repeat(n, 1),
+        rand(n, 2, dtype=torch.float32),
+    )
     sky = rand(8, 16, 3, dtype=torch.float32)
     return floor_under_a_ball().handle, points, normals, normals, views, *materials, *surface, *maps, sky, 4, 2, 0.0, 3
 
@@ -251,7 +300,12 @@ def sparse_inputs(dtype) -> tuple:
 def interpolation(dtype) -> tuple:
     first = torch.tensor([0, 0, 1, 2, 2, 4])
     share = torch.rand(6, generator=generator(), dtype=torch.float64).to(dtype)
-    return torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype), first, first.clamp(max=3) + 1, share
+    return (
+        torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype),
+        first,
+        first.clamp(max=3) + 1,
+        share,
+    )
 
 
 def interpolation_backward(dtype) -> tuple:
@@ -318,7 +372,7 @@ CASES = {
     "cached_visibility": cached_visibility_inputs,
     "interpolate": interpolation,
     "interpolate_backward": interpolation_backward,
-}  # fmt: skip
+}
 # Those that are worked out on the CPU alone: by Embree, or once a mesh.
 ON_THE_CPU_ALONE = {
     "occlusion_factors": lambda _: occlusion_inputs(),

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 import torch
-from torch.utils._pytree import tree_map
-
 from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
+from torch.utils._pytree import tree_map
 
 lib = torch.ops.splitnerf
 

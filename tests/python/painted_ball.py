@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import torch
 import trimesh
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb
@@ -28,10 +27,12 @@ def textured(vertices: np.ndarray, faces: np.ndarray, size: int = SIZE) -> Asset
     origins, faces, uv = unwrap(vertices.astype(np.float32), faces, size)
     vertices, normals = vertices[origins].astype(np.float32), normals[origins]
     material = Material(
-        roughness=1.0, metallic=1.0, albedo_texture=np.full((size, size, 3), 0.4, np.float32),
+        roughness=1.0,
+        metallic=1.0,
+        albedo_texture=np.full((size, size, 3), 0.4, np.float32),
         roughness_metallic_texture=np.tile(np.float32([0.5, 0.0]), (size, size, 1)),
         normal_texture=np.tile(np.float32([0, 0, 1]), (size, size, 1)),
-    )  # fmt: skip
+    )
     tangents = vertex_tangents(vertices, faces, normals, uv)
     ids = np.zeros(len(faces), np.int32)
     return Asset("ball", vertices, faces.astype(np.int32), normals, ids, [material], uv=uv, tangents=tangents)
@@ -86,9 +87,17 @@ def photos(asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128) -
         straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-6)[..., None]
         images.append(np.dstack([linear_to_srgb(straight).clip(0, 1), maps["alpha"]]))
     return Dataset(
-        "ball", Path(), "train", 1, np.stack(images).astype(np.float32), poses, np.tile(np.float32(lens), (n, 1)),
-        [str(i) for i in range(n)], [Path(str(i)) for i in range(n)], np.eye(4),
-    )  # fmt: skip
+        "ball",
+        Path(),
+        "train",
+        1,
+        np.stack(images).astype(np.float32),
+        poses,
+        np.tile(np.float32(lens), (n, 1)),
+        [str(i) for i in range(n)],
+        [Path(str(i)) for i in range(n)],
+        np.eye(4),
+    )
 
 
 def heights(texels: AssetTexels) -> torch.Tensor:

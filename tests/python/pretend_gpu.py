@@ -22,9 +22,25 @@ GPU = torch.device("cuda", 0)
 CPU = torch.device("cpu")
 ON_CPU_BY_CONTRACT = {"splitnerf.light_lookup": (4, 5), "splitnerf::light_lookup": (4, 5)}  # resolutions and nodes
 WAITS = {
-    "item", "tolist", "nonzero", "argwhere", "unique", "unique_consecutive", "masked_select", "bincount", "repeat_interleave",
-    "equal", "allclose", "is_nonzero", "__bool__", "__int__", "__float__", "__index__", "__contains__", "cpu",
-}  # fmt: skip
+    "item",
+    "tolist",
+    "nonzero",
+    "argwhere",
+    "unique",
+    "unique_consecutive",
+    "masked_select",
+    "bincount",
+    "repeat_interleave",
+    "equal",
+    "allclose",
+    "is_nonzero",
+    "__bool__",
+    "__int__",
+    "__float__",
+    "__index__",
+    "__contains__",
+    "cpu",
+}
 FROM_LISTS = {"tensor", "as_tensor", "new_tensor"}
 ACROSS = {"_has_compatible_shallow_copy_type", "__set__", "copy_"}  # one tensor takes the place of another
 
@@ -167,7 +183,11 @@ def masks(func, args: tuple) -> bool:
         return False
     index = args[1] if isinstance(args[1], tuple) else (args[1],)
     by_mask = any(isinstance(part, Tensor) and part.dtype in (torch.bool, torch.uint8) for part in index)
-    return any(isinstance(part, list) for part in index) or by_mask and (name == "__getitem__" or isinstance(args[2], Tensor))
+    return (
+        any(isinstance(part, list) for part in index)
+        or by_mask
+        and (name == "__getitem__" or isinstance(args[2], Tensor))
+    )
 
 
 def comes_from_cpu(func, args: tuple) -> bool:

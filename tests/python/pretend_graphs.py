@@ -13,14 +13,19 @@ from contextlib import nullcontext
 from typing import Any
 
 import torch
+from splitnerf.training import gpu_step, state
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
 
-from splitnerf.training import gpu_step, state
-
 REFUSED = (
-    "_local_scalar_dense", "lift_fresh", "_to_copy", "nonzero", "masked_select", "_unique2", "march_rays",
+    "_local_scalar_dense",
+    "lift_fresh",
+    "_to_copy",
+    "nonzero",
+    "masked_select",
+    "_unique2",
+    "march_rays",
     "sample_rays",
 )
 

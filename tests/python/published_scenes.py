@@ -7,15 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.rendering import (
-    CAMERA_ANGLE_X, CAMERA_DISTANCE, TEST_ELEVATION, TEST_SWING, TRAIN_ELEVATIONS, SynthSettings, normalised, synthesise,
+    CAMERA_ANGLE_X,
+    CAMERA_DISTANCE,
+    TEST_ELEVATION,
+    TEST_SWING,
+    TRAIN_ELEVATIONS,
+    SynthSettings,
+    normalised,
+    synthesise,
     unit_sphere,
-)  # fmt: skip
+)
 
 SIZE, TRAIN, TEST, SPP = 32, 4, 2, 192
 FOCAL = 0.5 * SIZE / np.tan(0.5 * CAMERA_ANGLE_X)
@@ -85,7 +91,9 @@ def write_set(folder: Path, layout: str, relights: bool) -> Written:
     for name, light in lights.items():
         write_image(folder / f"{name}.exr", light)
     relit = [folder / f"{name}.exr" for name in RELIT] if relights else []
-    root = synthesise(asset_path, folder / "studio.exr", relit, folder / "data", SynthSettings(SIZE, TRAIN, TEST, SPP, layout))
+    root = synthesise(
+        asset_path, folder / "studio.exr", relit, folder / "data", SynthSettings(SIZE, TRAIN, TEST, SPP, layout)
+    )
     original = read_asset(asset_path)
     renderer = AssetRenderer(normalised(original, *unit_sphere(original)))
     train = spiral(TRAIN, CAMERA_DISTANCE, TRAIN_ELEVATIONS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import torch
 from op_checks import generator, rand, unit
-
 from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples
 
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
@@ -33,7 +32,10 @@ def march_inputs(device, dtype, n: int = 40) -> tuple:
 def draw_inputs(dtype, n: int = 300) -> tuple:
     """Arguments of ``draw_rays``: a third of the rays near the runs of two of three photos of 8 x 11 pixels."""
     last, shift = torch.tensor([4, 5, 40]), torch.tensor([10, 30, 200])
-    none, matrices = torch.empty(0, dtype=torch.int64), torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64)
+    none, matrices = (
+        torch.empty(0, dtype=torch.int64),
+        torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64),
+    )
     cameras = matrices.to(dtype), torch.arange(9.0, dtype=dtype).view(3, 3)
     return rand(n, dtype=dtype), n // 3, last, shift, 40, none, none, 3 * 8 * 11, *cameras, 8, 11
 
@@ -42,7 +44,10 @@ def read_inputs(dtype, n: int = 300) -> tuple:
     """Arguments of ``read_pixels``: three photos of 40 pixels as words, and two runs of pixels at edges."""
     draw = generator(8)
     codes = torch.randint(-(2**15), 2**15, (120, 4), generator=draw).to(torch.int16)
-    index, behind = torch.randint(120, (n,), generator=draw), torch.randint(256, (46, 3), generator=draw).to(torch.uint8)
+    index, behind = (
+        torch.randint(120, (n,), generator=draw),
+        torch.randint(256, (46, 3), generator=draw).to(torch.uint8),
+    )
     edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54]), behind
     return codes, index, index // 40, rand(3, 3, seed=9, dtype=dtype), rand(n, 3, seed=10, dtype=dtype), *edges
 

@@ -7,7 +7,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
@@ -16,17 +15,33 @@ from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdow
 from splitnerf_tools.demo.scene import write_demo_dataset
 
 SMALL = [
-    "n_levels=2", "log2_table_size=8", "target_samples=256", "initial_rays=32", "grid_resolution=16", "light_resolution=16",
-    "light_queries=8", "eikonal_points=16", "mesh_resolution=16", "export_resolution=16",
-    "export_faces=200", "export_texture_size=32", "refinement.enabled=false",
-]  # fmt: skip
+    "n_levels=2",
+    "log2_table_size=8",
+    "target_samples=256",
+    "initial_rays=32",
+    "grid_resolution=16",
+    "light_resolution=16",
+    "light_queries=8",
+    "eikonal_points=16",
+    "mesh_resolution=16",
+    "export_resolution=16",
+    "export_faces=200",
+    "export_texture_size=32",
+    "refinement.enabled=false",
+]
 
 
 def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
     evaluation = {
-        "relight": relight and {"psnr": relight}, "albedo": {"psnr": 20.0}, "novel_view": {"psnr": novel_view}, "normal_mae_deg": 5.0,
-        "roughness_mae": 0.1, "metallic_balanced_accuracy": None, "light_psnr": 15.0, "seconds": 360.0,
-    }  # fmt: skip
+        "relight": relight and {"psnr": relight},
+        "albedo": {"psnr": 20.0},
+        "novel_view": {"psnr": novel_view},
+        "normal_mae_deg": 5.0,
+        "roughness_mae": 0.1,
+        "metallic_balanced_accuracy": None,
+        "light_psnr": 15.0,
+        "seconds": 360.0,
+    }
     return score_of("scene", row, FULL, seed, evaluation)
 
 
@@ -35,7 +50,9 @@ def test_every_row_is_possible(name, n_rows):
     """Most switches of the other preset are what preset paper does anyway."""
     rows = make_rows(preset(name))
     names = {row.name for row in rows}
-    assert len(names) == len(rows) == n_rows and all(row.reference in names and row.reference != row.name for row in rows[1:])
+    assert len(names) == len(rows) == n_rows and all(
+        row.reference in names and row.reference != row.name for row in rows[1:]
+    )
     assert REFERENCES.keys() <= (PAPER | SWITCHES).keys()
 
 
@@ -109,7 +126,11 @@ def test_tables_hold_what_is_known():
     assert rows[0]["relight"] == "30.0" and rows[1]["relight"] == "" and rows[0]["metallic"] == ""
     assert rows[0]["minutes"] == "6.0" and rows[0]["normals"] == "5.0" and rows[0]["reference"] == FULL
     text = markdown_table([score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0)])
-    assert "| full | 30.50 | 20.00 | 30.00 | 5.00 | 0.100 | - | 15.00 | 6.0 | 2 |" in text and "| b | 29.00 |" in text and "| -1.00 dB | full |" in text
+    assert (
+        "| full | 30.50 | 20.00 | 30.00 | 5.00 | 0.100 | - | 15.00 | 6.0 | 2 |" in text
+        and "| b | 29.00 |" in text
+        and "| -1.00 dB | full |" in text
+    )
 
 
 def test_it_runs_and_goes_on(tmp_path, capsys):

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 import torch
-
 from splitnerf import _core
 
 ROOT = Path(__file__).parents[2]

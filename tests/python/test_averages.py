@@ -8,18 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from test_known_pixels import ignoring_scene
-from test_edges import scene
-from tiny_runs import tiny
-
 from splitnerf.config import Config
 from splitnerf.data import pixels
 from splitnerf.data.dataset import Dataset, load_dataset
-from splitnerf.data.pixels import Photos
 from splitnerf.data.images import area_average, linear_to_srgb, srgb_to_linear
+from splitnerf.data.pixels import Photos
 from splitnerf.render.averages import averaging_factor, training_photos
 from splitnerf.render.rays import PixelSource
 from splitnerf.training import loop
+from test_edges import scene
+from test_known_pixels import ignoring_scene
+from tiny_runs import tiny
 
 
 def seeded() -> torch.Generator:

@@ -16,9 +16,16 @@ import pytest
 import trimesh
 from blender_data import SIZE, edit, make_blender, make_folders, set_pose
 from gltf_builder import Gltf, beside, triangle
-from layout_scenes import COLMAP_CAMERAS, COUNT, write_binary_model, write_colmap, write_neus, write_text_model, write_transforms
+from layout_scenes import (
+    COLMAP_CAMERAS,
+    COUNT,
+    write_binary_model,
+    write_colmap,
+    write_neus,
+    write_text_model,
+    write_transforms,
+)
 from PIL import Image
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
@@ -106,23 +113,38 @@ TRANSFORMS = {
     "name of half a character": (frame(file_path="\ud800"), "no such image"),
     "mask's name too long": (frame(mask_path="x" * 5000), "no such image"),
     "one image twice": (frame(file_path="train/../train/r_2"), "r_2.png: two frames have this image; remove one"),
-    **{f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a positive number") for x in ("bright", -1, 0, float("nan"))},
+    **{
+        f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a positive number")
+        for x in ("bright", -1, 0, float("nan"))
+    },
     **{f"gamma {x}": (frame(gamma=x), "'gamma' must be 0") for x in ("sRGB", -1, 0.5, float("nan"))},
     "no json": (file("transforms_train.json", b"{not json"), "transforms_train.json: is not valid json"),
     "a json list": (file("transforms_train.json", b"[1, 2]"), "transforms_train.json: must hold a json object"),
     "no text": (file("transforms_train.json", b"\xff\xfe"), "transforms_train.json: is not valid json"),
     "deep json": (file("transforms_train.json", b"[" * 100_000), "transforms_train.json: is not valid json"),
     "no folder": (shutil.rmtree, "data: no such folder"),
-    "no transforms": (lambda root: [path.unlink() for path in root.glob("*.json")], "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model"),
+    "no transforms": (
+        lambda root: [path.unlink() for path in root.glob("*.json")],
+        "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model",
+    ),
     "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
     "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
-    "larger image": (picture("train/r_4.png", SIZE, SIZE + 4, 4), f"r_4.png: is {SIZE + 4}x{SIZE}, r_0.png is {SIZE}x{SIZE}, and one lens is stated for both"),
-    "neither alpha nor mask": (picture("train/r_4.png", SIZE, SIZE, 3), "r_4.png: has no alpha channel and its frame no mask_path"),
+    "larger image": (
+        picture("train/r_4.png", SIZE, SIZE + 4, 4),
+        f"r_4.png: is {SIZE + 4}x{SIZE}, r_0.png is {SIZE}x{SIZE}, and one lens is stated for both",
+    ),
+    "neither alpha nor mask": (
+        picture("train/r_4.png", SIZE, SIZE, 3),
+        "r_4.png: has no alpha channel and its frame no mask_path",
+    ),
     "empty masks": (alpha(lambda i: np.zeros((SIZE, SIZE))), "train: every mask is empty"),
     "full masks": (alpha(lambda i: np.ones((SIZE, SIZE))), "train: nothing says where the object is"),
-    "masks of no object": (alpha(lambda i: np.outer(np.arange(SIZE) < 2 + i, np.arange(SIZE) >= SIZE - 2)), "masks and poses contradict each other"),
+    "masks of no object": (
+        alpha(lambda i: np.outer(np.arange(SIZE) < 2 + i, np.arange(SIZE) >= SIZE - 2)),
+        "masks and poses contradict each other",
+    ),
     "negative radiance": (negative_radiance, "r_0.exr: has NaN, infinite or negative pixels"),
-}  # fmt: skip
+}
 
 
 def keys(**content: object) -> Damage:
@@ -130,9 +152,15 @@ def keys(**content: object) -> Damage:
 
 
 NERFSTUDIO = {
-    "mask of another size": (picture("masks/v03.png.png", SIZE, 8), f"v03.png.png: is 8x{SIZE}, its image v03.png is {SIZE}x{SIZE}"),
+    "mask of another size": (
+        picture("masks/v03.png.png", SIZE, 8),
+        f"v03.png.png: is 8x{SIZE}, its image v03.png is {SIZE}x{SIZE}",
+    ),
     "mask of another kind": (keys(mask_kind="depth"), "'mask_kind' must be one of auto, object, ignore"),
-    "lens without a model": (keys(camera_model="FOV"), "transforms.json: camera model 'FOV' is not read; undistort the photos"),
+    "lens without a model": (
+        keys(camera_model="FOV"),
+        "transforms.json: camera model 'FOV' is not read; undistort the photos",
+    ),
     "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
     "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),
     "decentred fisheye": (keys(camera_model="OPENCV_FISHEYE", p1=0.1), "a fisheye with 'p1' or 'p2' is not read"),
@@ -143,7 +171,7 @@ NERFSTUDIO = {
     "f-theta lens": (keys(ftheta_p1=0.3), "'ftheta_p1' is not read"),
     "rolling shutter": (keys(rolling_shutter=[0, 0, 0.1]), "'rolling_shutter' is not read"),
     "lens that folds": (keys(k1=-900.0), "its lens, undistorted, covers .% of the image"),
-}  # fmt: skip
+}
 
 
 def view(change: Callable[[dict], object]) -> Damage:
@@ -151,14 +179,26 @@ def view(change: Callable[[dict], object]) -> Damage:
 
 
 VIEW_FOLDERS = {
-    "no matrix": (view(lambda m: m.pop("cam_transform_mat")), "train_003/metadata.json: missing key 'cam_transform_mat'"),
+    "no matrix": (
+        view(lambda m: m.pop("cam_transform_mat")),
+        "train_003/metadata.json: missing key 'cam_transform_mat'",
+    ),
     "no angle": (view(lambda m: m.pop("cam_angle_x")), "train_003/metadata.json: missing key 'cam_angle_x'"),
-    "twelve numbers": (view(lambda m: m.update(cam_transform_mat=",".join("1" * 12))), "train_003.*: cam_transform_mat is not a 4x4"),
-    "words": (view(lambda m: m.update(cam_transform_mat=",".join(["one"] * 16))), "train_003.*: cam_transform_mat is not a 4x4"),
-    "all zero": (view(lambda m: m.update(cam_transform_mat=",".join("0" * 16))), "train_003.*: cam_transform_mat is not a rigid"),
+    "twelve numbers": (
+        view(lambda m: m.update(cam_transform_mat=",".join("1" * 12))),
+        "train_003.*: cam_transform_mat is not a 4x4",
+    ),
+    "words": (
+        view(lambda m: m.update(cam_transform_mat=",".join(["one"] * 16))),
+        "train_003.*: cam_transform_mat is not a 4x4",
+    ),
+    "all zero": (
+        view(lambda m: m.update(cam_transform_mat=",".join("0" * 16))),
+        "train_003.*: cam_transform_mat is not a rigid",
+    ),
     "no photo": (lambda root: (root / "train_003/rgba.png").unlink(), "train_003/rgba.png: no such image"),
     "no metadata": (lambda root: (root / "train_003/metadata.json").unlink(), "train_003/metadata.json: no such file"),
-}  # fmt: skip
+}
 
 
 def cameras(content: dict) -> Damage:
@@ -175,12 +215,24 @@ def cameras(content: dict) -> Damage:
 
 
 COLMAP = {
-    "another camera model": (cameras(dict.fromkeys((1, 7), (7, "FOV", [9, 9], [1.0] * 5))), "camera model FOV is not read"),
+    "another camera model": (
+        cameras(dict.fromkeys((1, 7), (7, "FOV", [9, 9], [1.0] * 5))),
+        "camera model FOV is not read",
+    ),
     "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
-    "no focal length": (cameras({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'fl_x' must be"),
-    "NaN": (cameras({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}), "camera 1: 'k1' is no coefficient"),
-    "missing image": (lambda root: (root / "images/v05.png").unlink(), r"v05.png: no such image, with or without a suffix, though images.* lists it"),
-}  # fmt: skip
+    "no focal length": (
+        cameras({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}),
+        "camera 1: 'fl_x' must be",
+    ),
+    "NaN": (
+        cameras({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}),
+        "camera 1: 'k1' is no coefficient",
+    ),
+    "missing image": (
+        lambda root: (root / "images/v05.png").unlink(),
+        r"v05.png: no such image, with or without a suffix, though images.* lists it",
+    ),
+}
 POINTS = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1  # where the first image's number of points stands
 
 
@@ -219,7 +271,10 @@ NEUS = {
     "too few": (arrays(lambda a: a.pop(f"world_mat_{COUNT - 1}")), "image: has 16 images, cameras_sphere.npz has 15"),
     "none": (arrays(lambda a: [a.pop(f"world_mat_{i}") for i in range(COUNT)]), "needs world_mat_0"),
     "large": (arrays(lambda a: a.update(world_mat_2=np.zeros((400, 400)))), "has more than 4096 bytes"),
-    "an object": (arrays(lambda a: a.update(world_mat_2=np.array([{}], object))), "cannot be read as a file of NumPy arrays"),
+    "an object": (
+        arrays(lambda a: a.update(world_mat_2=np.array([{}], object))),
+        "cannot be read as a file of NumPy arrays",
+    ),
 }
 
 
@@ -237,7 +292,7 @@ STANFORD_ORB = {
         "'scene_name' of frame 0 is no folder's name",
     )
     for name in ("", ".", "..", "a/b", "/a", "a\\b", "a\0", 7, None)
-} | {"missing photo": (lambda root: (root / "x/test/0000.exr").unlink(), "0000: no such image")}  # fmt: skip
+} | {"missing photo": (lambda root: (root / "x/test/0000.exr").unlink(), "0000: no such image")}
 
 
 def png(width: int, height: int) -> bytes:
@@ -253,21 +308,29 @@ def write_images(root: Path) -> None:
 
 
 CLAIMED = "is said to be 4000x4000, too large for its file"
-WORDLESS = struct.pack("<II", 20000630, 2) + b"displayWindow\0\xff\xff\xff\0" + struct.pack("<I4i", 16, 0, 0, 7, 3) + bytes(64)
+WORDLESS = (
+    struct.pack("<II", 20000630, 2) + b"displayWindow\0\xff\xff\xff\0" + struct.pack("<I4i", 16, 0, 0, 7, 3) + bytes(64)
+)
 BITMAP = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
 IMAGES = {
     **{
-        f"half {suffix}": (rewritten(f"cut{suffix}", lambda whole: whole[: len(whole) // 2]), f"cut{suffix}: .*(truncated|cannot be read)")
+        f"half {suffix}": (
+            rewritten(f"cut{suffix}", lambda whole: whole[: len(whole) // 2]),
+            f"cut{suffix}: .*(truncated|cannot be read)",
+        )
         for suffix in (".png", ".jpg", ".exr", ".hdr")
     },
     "none": (lambda root: root / "gone.png", "gone.png: no such image"),
     "text": (file("a.png", b"no image"), "a.png: cannot be read"),
     "large PNG": (file("a.png", png(4000, 4000)), f"a.png: {CLAIMED}"),
     "large HDR": (file("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 4000\n"), f"a.hdr: {CLAIMED}"),
-    "too many pixels": (file("a.png", png(20_000, 20_000) + bytes(300_000)), "a.png: is 20000x20000, the most is 134 megapixels of 4"),
+    "too many pixels": (
+        file("a.png", png(20_000, 20_000) + bytes(300_000)),
+        "a.png: is 20000x20000, the most is 134 megapixels of 4",
+    ),
     "error that is no text": (file("a.exr", WORDLESS), "a.exr: cannot be read as an image"),
     "another format": (file("a.png", BITMAP), "a.png: cannot be read as an image"),
-}  # fmt: skip
+}
 
 
 def floats(pixels: np.ndarray) -> Damage:
@@ -298,9 +361,12 @@ MAPS = {
     "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
     "square": (floats(np.ones((8, 8, 3))), "a.exr: is 8x8; an equirectangular map is twice as wide as high"),
     "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
-    "PNG": (lambda root: [write_image(root / "a.png", np.ones((4, 8, 3))), root / "a.png"][1], "a.png: .* must hold linear radiance"),
+    "PNG": (
+        lambda root: [write_image(root / "a.png", np.ones((4, 8, 3))), root / "a.png"][1],
+        "a.png: .* must hold linear radiance",
+    ),
     "none": (lambda root: root / "b.hdr", "no such environment map"),
-}  # fmt: skip
+}
 
 
 def flat(root: Path) -> Path:
@@ -309,9 +375,10 @@ def flat(root: Path) -> Path:
 
 
 MESHES = {
-    "flat": (flat, "flat.ply: degenerate or empty mesh"), "text": (file("a.ply", b"no mesh"), "a.ply: cannot be read as a mesh"),
+    "flat": (flat, "flat.ply: degenerate or empty mesh"),
+    "text": (file("a.ply", b"no mesh"), "a.ply: cannot be read as a mesh"),
     "none": (lambda root: root / "b.ply", "no such mesh"),
-}  # fmt: skip
+}
 TRUTH = {"another size": (picture("test/r_0_albedo.png", 8, 8, 4), "r_0_albedo.png: is 8x8, not the size of r_0.png")}
 
 
@@ -399,10 +466,16 @@ GLTF = {
     "long accessor": (accessor(count=1000), "an accessor reaches beyond its buffer view"),
     "negative count": (accessor(count=-3), "not valid glTF"),
     "no coordinates": (gltf(texture), "material 'm' has textures, but a mesh with it has no TEXCOORD_0"),
-    "two coordinates": (gltf(lambda g: texture(g, emissiveTexture={"index": 0, "texCoord": 1})), "'m' have different coordinates"),
+    "two coordinates": (
+        gltf(lambda g: texture(g, emissiveTexture={"index": 0, "texCoord": 1})),
+        "'m' have different coordinates",
+    ),
     "NaN factor": (gltf(endless_factor), "material 'm' has a factor that is no usable number"),
     "no image": (gltf(broken_image), "image 0 'bad': cannot be read as an image"),
-    "endless zeros": (gltf(lambda g: g.json["accessors"].__setitem__(0, {"componentType": 5126, "count": 10**9, "type": "VEC3"})), UNPACKS),
+    "endless zeros": (
+        gltf(lambda g: g.json["accessors"].__setitem__(0, {"componentType": 5126, "count": 10**9, "type": "VEC3"})),
+        UNPACKS,
+    ),
     "one vertex for all": (gltf(one_vertex_for_all), f"{UNPACKS}|byteStride"),
     "many instances": (gltf(many_instances), UNPACKS),
     "no stride": (gltf(lambda g: g.json["bufferViews"][0].update(byteStride=0)), "byteStride"),
@@ -414,13 +487,19 @@ GLTF = {
     "a list": (file("a.glb", b"[]"), "is JSON but not glTF"),
     "deep JSON": (file("a.gltf", b"[" * 100_000), "a.gltf: is neither"),
     "no file": (lambda root: root / "b.glb", "b.glb: no such file"),
-    "no buffer": (lambda root: beside(root, "gone%20too.bin"), "gone too.bin: no such file, though a.gltf refers to it"),
+    "no buffer": (
+        lambda root: beside(root, "gone%20too.bin"),
+        "gone too.bin: no such file, though a.gltf refers to it",
+    ),
     "a pipe": (lambda root: beside(root, "pipe.bin"), "pipe.bin: no such file"),
     **{
-        f"outside by {uri}": (lambda root, uri=uri: beside(root, uri), "a.gltf: refers to .*, outside its folder; put the file there")
+        f"outside by {uri}": (
+            lambda root, uri=uri: beside(root, uri),
+            "a.gltf: refers to .*, outside its folder; put the file there",
+        )
         for uri in ("../secret.bin", "%2e%2e/secret.bin", "sub/../../secret.bin", "{root}/secret.bin", "link.bin")
     },
-}  # fmt: skip
+}
 
 
 def load(folder: Path, _) -> object:
@@ -475,9 +554,15 @@ def test_bad_files_give_one_line_that_names_them(good, tmp_path, form, case):
 # ---- what looks bad and is not ----
 
 
-@pytest.mark.parametrize("uri", [
-    "sub/the%20data.bin", "./sub/../sub/the%20data.bin", "inside.bin", "data:application/octet-stream;base64,{inline}",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "sub/the%20data.bin",
+        "./sub/../sub/the%20data.bin",
+        "inside.bin",
+        "data:application/octet-stream;base64,{inline}",
+    ],
+)
 def test_gltf_below_its_folder_is_read(tmp_path, uri):
     whole = read_asset(triangle().write(tmp_path / "a.glb"))
     assert np.array_equal(read_asset(beside(tmp_path, uri)).vertices, whole.vertices)

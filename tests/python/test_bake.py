@@ -9,7 +9,6 @@ import trimesh
 from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export import surface
 from splitnerf.export.bake import Spread, UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
@@ -143,8 +142,11 @@ def test_a_chart_keeps_its_shape():
     vertices, faces = np.float32([[0, 0, 0], [8, 0, 0], [8, 1, 0], [0, 1, 0]]), np.int32([[0, 1, 2], [0, 2, 3]])
     origins, new_faces, uv = unwrap(vertices, faces, SIZE)
     points = vertices[origins]
-    scales = [np.linalg.norm(uv[new_faces[:, i]] - uv[new_faces[:, i - 1]], axis=1)
-              / np.linalg.norm(points[new_faces[:, i]] - points[new_faces[:, i - 1]], axis=1) for i in range(3)]  # fmt: skip
+    scales = [
+        np.linalg.norm(uv[new_faces[:, i]] - uv[new_faces[:, i - 1]], axis=1)
+        / np.linalg.norm(points[new_faces[:, i]] - points[new_faces[:, i - 1]], axis=1)
+        for i in range(3)
+    ]
     assert np.ptp(scales) < 0.02 * np.mean(scales)
 
 
@@ -152,7 +154,9 @@ def test_charts_are_small_and_fill_a_large_texture():
     """None holds much more than 1 / 64 of the surface; between them lie texels of the texture as it is asked for."""
     ball = trimesh.creation.icosphere(subdivisions=4)
     _, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), 1024)
-    graph = coo_matrix((np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(len(uv),) * 2)
+    graph = coo_matrix(
+        (np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(len(uv),) * 2
+    )
     _, chart = connected_components(graph, directed=False)
     assert np.bincount(chart[faces[:, 0]], ball.area_faces).max() < 2 * ball.area / 64
     assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2

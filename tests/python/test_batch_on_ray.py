@@ -17,10 +17,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from tiny_runs import SMALL, as_options
-
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from splitnerf_tools.batch.scenes import known_scenes
+from tiny_runs import SMALL, as_options
 
 pytestmark = [
     pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed: pip install 'splitnerf[batch]'"),
@@ -132,7 +131,7 @@ def listeners(processes: set[int]) -> set[str]:
     found = set()
     for table in ("/proc/net/tcp", "/proc/net/tcp6"):
         for line in Path(table).read_text().splitlines()[1:]:
-            _, local, _, state, *_, = line.split()
+            _, local, _, state, *_ = line.split()
             if state == "0A" and f"socket:[{line.split()[9]}]" in sockets:
                 found.add(local.partition(":")[0])
     return found
@@ -187,7 +186,10 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         asked = call(tmp_path, "--out", tmp_path / "out", "--address", address)
         assert asked.program.wait(TIMEOUT) == BAD_INPUT
-    assert asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers") and len(asked.err.splitlines()) == 1
+    assert (
+        asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers")
+        and len(asked.err.splitlines()) == 1
+    )
 
 
 @pytest.mark.slow
@@ -199,7 +201,9 @@ def test_six_scenes_of_which_one_is_killed_and_one_damaged(data, tmp_path, call)
     words = (*scenes, "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
     first = call(*words)
     os.kill(first.wait_until(lambda: worker_of(out / "ball")), signal.SIGKILL)
-    first.wait_until(lambda: "splitnerf: note: ball: its worker was killed; it continues from its last checkpoint" in first.err)
+    first.wait_until(
+        lambda: "splitnerf: note: ball: its worker was killed; it continues from its last checkpoint" in first.err
+    )
     first.wait_until(lambda: sum((out / scene.name / "mesh.glb").exists() for scene in good) >= 2)
     first.program.send_signal(signal.SIGINT)
     assert first.end() == INTERRUPTED and "stopped; to continue, repeat the command." in first.out

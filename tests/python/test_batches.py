@@ -7,12 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from tiny_runs import tiny
-
 from splitnerf.ops import EdgeRuns, read_pixels
 from splitnerf.render.edges import EdgePixels
 from splitnerf.render.rays import DrawnRays
 from splitnerf.training.batches import draw_batch, draw_numbers
+from tiny_runs import tiny
 
 
 def drawn(seed: int = 0, edges: EdgePixels | None = None, **settings):
@@ -22,7 +21,9 @@ def drawn(seed: int = 0, edges: EdgePixels | None = None, **settings):
 
     def draw(n: int, random: torch.Tensor, backgrounds: torch.Tensor, exposures: torch.Tensor) -> DrawnRays:
         assert random.shape == (n,) and 0 <= random.min() < 0.01 and 0.99 < random.max() < 1
-        pixels, *beside = read_pixels(torch.full((n, 4), 3.0), torch.arange(n), torch.arange(n) % 3, exposures, backgrounds, runs)
+        pixels, *beside = read_pixels(
+            torch.full((n, 4), 3.0), torch.arange(n), torch.arange(n) % 3, exposures, backgrounds, runs
+        )
         return DrawnRays(torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), pixels, torch.arange(n) % 3, *beside)
 
     source = SimpleNamespace(generator=torch.Generator().manual_seed(seed), draw=draw)
@@ -43,7 +44,9 @@ def test_what_is_drawn_fills_its_range():
     assert (batch.background[:, 0] != batch.background[:, 1]).all()
     for x in (batch.background, batch.jitter, batch.phase, batch.probes.chosen):
         assert 0 <= x.min() < 0.01 and 0.99 < x.max() < 1
-    apart = torch.stack([batch.jitter, batch.phase, *batch.background.T, batch.probes.chosen[:2000], *batch.probes.shifts[:2000].T])
+    apart = torch.stack(
+        [batch.jitter, batch.phase, *batch.background.T, batch.probes.chosen[:2000], *batch.probes.shifts[:2000].T]
+    )
     assert (torch.corrcoef(apart) - torch.eye(9)).abs().max() < 0.1
     anywhere, shifts = batch.probes.anywhere, batch.probes.shifts
     assert anywhere.shape == (4000, 3) and -1.3 <= anywhere.min() < -1.29 and 1.29 < anywhere.max() <= 1.3

@@ -12,23 +12,31 @@ import numpy as np
 import pytest
 import torch
 from bench import operators, shading, split_sum, tables
-from torch.nn import functional as F
-
 from splitnerf.cli import DONE, main
 from splitnerf.errors import CheckFailed
 from splitnerf.fields import SdfField
 from splitnerf_tools.bench import harness, normals, path_tracer, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
 from splitnerf_tools.bench.harness import interleaved
-from splitnerf_tools.bench.subjects import MapLight, pyramid_of
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
+from splitnerf_tools.bench.subjects import MapLight, pyramid_of
 from splitnerf_tools.demo.scene import write_demo_dataset
+from torch.nn import functional as F
 
 SMALL = [
-    "n_levels=2", "log2_table_size=8", "initial_rays=32", "grid_resolution=16", "light_resolution=16", "light_queries=8",
-    "eikonal_points=16", "mesh_resolution=16", "export_resolution=16", "export_faces=200",
-    "export_texture_size=32", "refinement.enabled=false",
-]  # fmt: skip
+    "n_levels=2",
+    "log2_table_size=8",
+    "initial_rays=32",
+    "grid_resolution=16",
+    "light_resolution=16",
+    "light_queries=8",
+    "eikonal_points=16",
+    "mesh_resolution=16",
+    "export_resolution=16",
+    "export_faces=200",
+    "export_texture_size=32",
+    "refinement.enabled=false",
+]
 
 
 def point(name: str, cost: float, error: float, default: bool = False) -> Point:
@@ -182,7 +190,11 @@ def test_pages_and_pictures_are_written(tmp_path, monkeypatch, capsys):
     lines = (tmp_path / "out" / "normals.csv").read_text().splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert {row["series"] for row in rows if row["default"] == "1"} == {"analytic"}
-    errors = {row["variant"]: float(row["error"]) for row in rows if row["chart"].endswith("angle to the field's gradient in float64")}
+    errors = {
+        row["variant"]: float(row["error"])
+        for row in rows
+        if row["chart"].endswith("angle to the field's gradient in float64")
+    }
     assert errors[""] < 1e-2 < errors["eps = 0.01 cells"] < 1 < errors["eps = 1 cells"]
 
 

@@ -14,9 +14,6 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
-from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
-from test_files import no_more_than
-
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import seen_at
@@ -27,15 +24,23 @@ from splitnerf.fields import EvaluatedLight, LightPyramid
 from splitnerf.files import LOCK, PARTIAL
 from splitnerf.training.losses import SeenLight
 from splitnerf_tools.capture import prepare as preparation
-from splitnerf_tools.capture.photometry import find_exposures
-from splitnerf_tools.capture.prepare import PrepareSettings, _begin, _upright_copies, _without_camera
 from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
-from splitnerf_tools.capture.photographs import Photograph, find_photographs, read_upright, sharpness, write_frames, write_png
+from splitnerf_tools.capture.photographs import (
+    Photograph,
+    find_photographs,
+    read_upright,
+    sharpness,
+    write_frames,
+    write_png,
+)
+from splitnerf_tools.capture.photometry import find_exposures
 from splitnerf_tools.capture.poses import Lens, Reconstruction
+from splitnerf_tools.capture.prepare import PrepareSettings, _begin, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
-
+from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
+from test_files import no_more_than
 
 PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -58,8 +63,15 @@ def found_scene(n: int = 12) -> tuple[Reconstruction, np.ndarray]:
     points = np.concatenate([ball, table, far])
     poses = ring(n)
     scene = Reconstruction(
-        [f"p_{i:02d}" for i in range(n)], poses, [PLAIN] * n, points, np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)),
-        error=0.3, n_models=1,
+        [f"p_{i:02d}" for i in range(n)],
+        poses,
+        [PLAIN] * n,
+        points,
+        np.zeros(0, int),
+        np.zeros(0, int),
+        np.zeros((0, 2)),
+        error=0.3,
+        n_models=1,
     )
     return scene, np.arange(len(points)) < len(ball)
 
@@ -258,7 +270,9 @@ def test_files_tell_of_turns_and_exposures(tmp_path):
     assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
     assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
     assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
-    assert first.exposure == pytest.approx(0.25) and first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
+    assert first.exposure == pytest.approx(0.25) and first.focal == pytest.approx(
+        26 / np.hypot(36, 24) * np.hypot(20, 30)
+    )
     assert (second.exposure, second.focal) == (None, None)
 
 
@@ -290,14 +304,18 @@ def test_photos_to_data(tmp_path, capsys, given):
     truth = write_photos(tmp_path / "photos", n)
     (tmp_path / "masks").mkdir()
     for path, pose in zip(sorted((tmp_path / "photos").iterdir()), truth):
-        Image.fromarray(255 * photograph(pose, *CAMERA)[1].astype(np.uint8)).save(tmp_path / "masks" / f"{path.stem}.png")
+        Image.fromarray(255 * photograph(pose, *CAMERA)[1].astype(np.uint8)).save(
+            tmp_path / "masks" / f"{path.stem}.png"
+        )
     masks = ["--masks", str(tmp_path / "masks")] if given else []
     assert main(["prepare", str(tmp_path / "photos"), *masks, "--out", str(tmp_path / "data")]) == 0
     assert f"{n} of {n} photos" in capsys.readouterr().out
     frames = json.loads((tmp_path / "data" / "transforms.json").read_text())["frames"]
     poses = np.array([frame["transform_matrix"] for frame in frames])
     # Centres relative to the ball's, in the cameras' distances, are what no similarity changes but a turn about z.
-    angle = np.unwrap(np.arctan2(poses[:, 1, 3], poses[:, 0, 3])) - np.unwrap(np.arctan2(truth[:, 1, 3], truth[:, 0, 3]))
+    angle = np.unwrap(np.arctan2(poses[:, 1, 3], poses[:, 0, 3])) - np.unwrap(
+        np.arctan2(truth[:, 1, 3], truth[:, 0, 3])
+    )
     assert np.ptp(angle) < 0.01
     assert np.allclose(poses[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
     overlap = []

@@ -9,7 +9,6 @@ import torch
 import trimesh
 from mesh_shapes import OFFSET, corners, grid_mesh, scene_of
 from op_checks import generator, unit
-
 from splitnerf.fields import EvaluatedLight, Light, LightPyramid, OcclusionQuery, VisibilityBits
 from splitnerf.fields.light_pyramid import octahedral_texels
 from splitnerf.ops import cached_visibility
@@ -40,7 +39,9 @@ def test_texels_divide_the_sphere():
     """Their middles lie in their texels: a light that is linear in the direction is read there as it is."""
     directions, solid_angles = octahedral_texels(64, torch.device("cpu"))
     assert solid_angles.sum().item() == pytest.approx(4 * math.pi, rel=1e-5)
-    torch.testing.assert_close((directions.T * solid_angles) @ directions, 4 * math.pi / 3 * torch.eye(3), rtol=0, atol=4e-3)
+    torch.testing.assert_close(
+        (directions.T * solid_angles) @ directions, 4 * math.pi / 3 * torch.eye(3), rtol=0, atol=4e-3
+    )
     light = LightPyramid(64)
     with torch.no_grad():
         light.texels.zero_()
@@ -105,7 +106,9 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
 
     apart = {True: [], False: []}
     for seed in range(6):
-        sun = unit(torch.tensor([[0.0, 0.0, 1.0]]) + 0.5 * torch.randn(1, 3, generator=generator(seed)).clamp(-1.2, 1.2))[0]
+        sun = unit(
+            torch.tensor([[0.0, 0.0, 1.0]]) + 0.5 * torch.randn(1, 3, generator=generator(seed)).clamp(-1.2, 1.2)
+        )[0]
         sun = unit(sun[None] * torch.tensor([1.0, 1.0, 1.6]))[0]
         light = lamp(sun)
         true = octahedral_texels(128, torch.device("cpu"))[0]

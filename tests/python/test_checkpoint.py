@@ -15,9 +15,6 @@ from pathlib import Path
 
 import pytest
 import torch
-from test_files import no_more_than
-from tiny_runs import tiny
-
 from splitnerf.data import tensor_files
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.tensor_files import LONGEST_PICKLE
@@ -28,6 +25,8 @@ from splitnerf.training import checkpoint
 from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser, restored_grid
 from splitnerf.training.schedule import make_optimiser
+from test_files import no_more_than
+from tiny_runs import tiny
 
 
 @pytest.fixture(scope="module")
@@ -100,13 +99,15 @@ DAMAGED = {
     "compressed parts": (functools.partial(repack, compression=zipfile.ZIP_DEFLATED), "its parts are compressed"),
     "more parts than bytes": (list_parts_often, "not a readable checkpoint"),
     "a pickle that is too long": (
-        lambda path: repack(path, lambda pickled: pickled + bytes(LONGEST_PICKLE + 1 - len(pickled))), "its pickle is too long",
+        lambda path: repack(path, lambda pickled: pickled + bytes(LONGEST_PICKLE + 1 - len(pickled))),
+        "its pickle is too long",
     ),
     "no file": (Path.unlink, "no checkpoint there"),
     "another format": (
-        lambda path: torch.save(torch.load(path, weights_only=True) | {"format": 2}, path), "format 2, this version reads 1",
+        lambda path: torch.save(torch.load(path, weights_only=True) | {"format": 2}, path),
+        "format 2, this version reads 1",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", DAMAGED)
@@ -233,7 +234,10 @@ def poisoned(tensor: torch.Tensor) -> torch.Tensor:
 
 ALLOWED = {
     "the most rays": put(n_rays=8192),
-    "more rays at first than later": lambda c: (put(n_rays=20000)(c), put("config", "constants", initial_rays=20000)(c)),
+    "more rays at first than later": lambda c: (
+        put(n_rays=20000)(c),
+        put("config", "constants", initial_rays=20000)(c),
+    ),
     "parameters whose sum is too large": parameter("light.texels", lambda x: x.fill_(3e38)),
     "the largest progress": put(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
     "no mean of quality yet": put(psnr_mean=None),
@@ -357,7 +361,9 @@ def test_a_checkpoint_that_does_not_fit_is_refused(data, content, tmp_path, case
     change(content)
     torch.save(content, tmp_path / "checkpoint.pt")
     before = torch.get_rng_state()
-    with pytest.raises(InputError, match="checkpoint.pt: its .* (does not fit the settings|cannot be restored)") as caught:
+    with pytest.raises(
+        InputError, match="checkpoint.pt: its .* (does not fit the settings|cannot be restored)"
+    ) as caught:
         trainer.train(load_dataset(data), tiny(steps=4, **settings), tmp_path, resume=True)
     assert len(str(caught.value).splitlines()) == 1
     torch.set_rng_state(before)

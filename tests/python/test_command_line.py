@@ -8,7 +8,6 @@ import shutil
 import subprocess
 
 import pytest
-
 from splitnerf.cli import build_parser
 from splitnerf.cli.completion import SHELLS
 from splitnerf.cli.help import examples_in

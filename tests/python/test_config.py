@@ -11,7 +11,6 @@ import pytest
 from hypothesis import HealthCheck, assume, given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
-
 from splitnerf.cli import DONE, main
 from splitnerf.config import FIELDS, GROUPS, SHORT_NAMES, Config, parse_setting, preset, settings_table
 from splitnerf.config.setting import setting
@@ -37,28 +36,73 @@ def check_same(found: dict[str, object], expected: dict[str, object]) -> None:
 
 # What the paper states (section 4, supplement), or the released code where it says nothing: light_samples, light_queries.
 PAPER = {
-    "run.steps": 20000, "surface.n_levels": 16, "surface.growth": 1.3195079, "surface.log2_table_size": 19,
-    "surface.start": "sphere", "surface.normals": "finite_difference", "materials.inputs": "outputs", "light.kind": "mlp",
-    "shading.method": "split", "shading.fresnel": "paper", "shading.query": "reflection", "shading.compensate": False,
-    "shading.compositing": "srgb", "occlusion.kind": "mlp", "occlusion.channels": 1, "occlusion.directional": False,
-    "occlusion.indirect": False, "mesh.every": 0.1, "mesh.resolution": 512, "sampling.max_rays": 8192,
-    "sampling.target_samples": 262144, "sampling.min_weight": 0.0, "sampling.occupancy": "average",
-    "sampling.grid_resolution": 128, "sampling.pixel_cells": 0.0, "losses.colour_weight": 10.0, "losses.light_weight": 10.0,
-    "losses.occlusion_weight": 0.01, "losses.eikonal_weight": 0.1, "losses.metal_weight": 0.001, "losses.mask_weight": 0.0,
-    "constants.box": 1.5, "constants.base_resolution": 32, "constants.start_levels": 4,
+    "run.steps": 20000,
+    "surface.n_levels": 16,
+    "surface.growth": 1.3195079,
+    "surface.log2_table_size": 19,
+    "surface.start": "sphere",
+    "surface.normals": "finite_difference",
+    "materials.inputs": "outputs",
+    "light.kind": "mlp",
+    "shading.method": "split",
+    "shading.fresnel": "paper",
+    "shading.query": "reflection",
+    "shading.compensate": False,
+    "shading.compositing": "srgb",
+    "occlusion.kind": "mlp",
+    "occlusion.channels": 1,
+    "occlusion.directional": False,
+    "occlusion.indirect": False,
+    "mesh.every": 0.1,
+    "mesh.resolution": 512,
+    "sampling.max_rays": 8192,
+    "sampling.target_samples": 262144,
+    "sampling.min_weight": 0.0,
+    "sampling.occupancy": "average",
+    "sampling.grid_resolution": 128,
+    "sampling.pixel_cells": 0.0,
+    "losses.colour_weight": 10.0,
+    "losses.light_weight": 10.0,
+    "losses.occlusion_weight": 0.01,
+    "losses.eikonal_weight": 0.1,
+    "losses.metal_weight": 0.001,
+    "losses.mask_weight": 0.0,
+    "constants.box": 1.5,
+    "constants.base_resolution": 32,
+    "constants.start_levels": 4,
     "constants.levels_open_by": 0.6,  # 12 levels, one each 1000 of 20,000 steps
-    "constants.surface_width": 64, "constants.sphere_radius": 0.5, "constants.initial_variance": 0.3,
-    "constants.cos_anneal_by": 1.0, "constants.materials_width": 256, "constants.min_roughness": 0.0,
-    "constants.light_width": 256, "constants.light_layers": 5, "constants.direction_frequencies": 10,
-    "constants.roughness_frequencies": 5, "constants.light_activation": "softplus", "constants.occlusion_width": 256,
-    "constants.occlusion_share": 0.1, "constants.occlusion_rays": 64, "constants.initial_rays": 256,
-    "constants.step_scale": 0.0, "constants.min_step": math.sqrt(3) * 3 / 1024, "constants.min_transmittance": 0.0,
-    "constants.shades_per_ray": 0, "constants.grid_every": 16, "constants.hull_until": 0.0,
-    "constants.foreground_share": 0.0, "constants.light_form": "square", "constants.light_set": "uniform",
-    "constants.light_samples": 8129, "constants.light_queries": 8129, "constants.light_lobe_below": 0.0,
-    "constants.eikonal_points": 0, "constants.learning_rate": 0.01, "constants.warmup_steps": 500,
+    "constants.surface_width": 64,
+    "constants.sphere_radius": 0.5,
+    "constants.initial_variance": 0.3,
+    "constants.cos_anneal_by": 1.0,
+    "constants.materials_width": 256,
+    "constants.min_roughness": 0.0,
+    "constants.light_width": 256,
+    "constants.light_layers": 5,
+    "constants.direction_frequencies": 10,
+    "constants.roughness_frequencies": 5,
+    "constants.light_activation": "softplus",
+    "constants.occlusion_width": 256,
+    "constants.occlusion_share": 0.1,
+    "constants.occlusion_rays": 64,
+    "constants.initial_rays": 256,
+    "constants.step_scale": 0.0,
+    "constants.min_step": math.sqrt(3) * 3 / 1024,
+    "constants.min_transmittance": 0.0,
+    "constants.shades_per_ray": 0,
+    "constants.grid_every": 16,
+    "constants.hull_until": 0.0,
+    "constants.foreground_share": 0.0,
+    "constants.light_form": "square",
+    "constants.light_set": "uniform",
+    "constants.light_samples": 8129,
+    "constants.light_queries": 8129,
+    "constants.light_lobe_below": 0.0,
+    "constants.eikonal_points": 0,
+    "constants.learning_rate": 0.01,
+    "constants.warmup_steps": 500,
     "constants.final_learning_rate": 0.1,
-}  # fmt: skip
+}
 
 
 def test_preset_paper_holds_the_numbers_of_the_paper():
@@ -108,9 +152,11 @@ def test_settings_change_by_name_by_short_one_and_by_group():
     changed = Config().replace(
         {"light_resolution": 64, "losses.eikonal_weight": 2.0, "export": {"faces": 7, "resolution": 9}}
     )
-    check_same(values(changed), values(Config()) | {
-        "light.resolution": 64, "losses.eikonal_weight": 2.0, "export.faces": 7, "export.resolution": 9,
-    })  # fmt: skip
+    check_same(
+        values(changed),
+        values(Config())
+        | {"light.resolution": 64, "losses.eikonal_weight": 2.0, "export.faces": 7, "export.resolution": 9},
+    )
     assert Config().light.resolution == 128
     # The last one counts, whatever it is called by.
     assert Config().replace({"n_levels": 5, "surface": {"n_levels": 6}}).surface.n_levels == 6
@@ -169,8 +215,14 @@ def test_settings_cannot_change_in_place():
         ({"light.resolution": 48}, "light.resolution must be a power of 2 in [16, 1024], got 48"),
         ({"light.resolution": 8}, "light.resolution must be a power of 2 in [16, 1024], got 8"),
         ({"light.resolution": 2048}, "light.resolution must be a power of 2 in [16, 1024], got 2048"),
-        ({"constants.occlusion_directions": 250}, "constants.occlusion_directions must be a multiple of 32 in [64, 1024], got 250"),
-        ({"constants.occlusion_directions": 32}, "constants.occlusion_directions must be a multiple of 32 in [64, 1024], got 32"),
+        (
+            {"constants.occlusion_directions": 250},
+            "constants.occlusion_directions must be a multiple of 32 in [64, 1024], got 250",
+        ),
+        (
+            {"constants.occlusion_directions": 32},
+            "constants.occlusion_directions must be a multiple of 32 in [64, 1024], got 32",
+        ),
         ({"occlusion.kind": "off"}, "shading.method = summed needs"),
         ({"shading.compositing": "srgb"}, "shading.method = summed needs"),
         ({"shading.fresnel": "code"}, "shading.method = summed needs"),
@@ -191,13 +243,30 @@ def test_what_cannot_be_is_said_in_one_line(settings, message):
     assert str(caught.value).startswith(message) and len(str(caught.value).splitlines()) == 1
 
 
-@pytest.mark.parametrize("settings", [
-    {"constants.box": 2}, {"constants.occlusion_directions": 1024}, {"light.resolution": 1024}, {"light.resolution": 16},
-    {"surface.n_levels": 1}, {"surface.n_levels": 32}, {"sampling.min_weight": 0.0}, {"run.seed": -5},
-    {"surface.growth": 1.0}, {"run.cuda_graphs": True}, {"run.deterministic": True}, {"run.max_minutes": 1.0},
-    {"run.cuda_graphs": True, "shading.method": "split", "occlusion.kind": "off"},
-    {"shading.method": "split", "occlusion.kind": "bits", "constants.occlusion_directions": 64, "shading.fresnel": "code"},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"constants.box": 2},
+        {"constants.occlusion_directions": 1024},
+        {"light.resolution": 1024},
+        {"light.resolution": 16},
+        {"surface.n_levels": 1},
+        {"surface.n_levels": 32},
+        {"sampling.min_weight": 0.0},
+        {"run.seed": -5},
+        {"surface.growth": 1.0},
+        {"run.cuda_graphs": True},
+        {"run.deterministic": True},
+        {"run.max_minutes": 1.0},
+        {"run.cuda_graphs": True, "shading.method": "split", "occlusion.kind": "off"},
+        {
+            "shading.method": "split",
+            "occlusion.kind": "bits",
+            "constants.occlusion_directions": 64,
+            "shading.fresnel": "code",
+        },
+    ],
+)
 def test_what_can_be_is_taken(settings):
     assert {name: Config().replace(settings)[name] for name in settings} == settings
 
@@ -243,7 +312,9 @@ def test_the_file_has_a_table_for_each_group(tmp_path):
     path = tmp_path / "config.toml"
     preset("paper").write(path)
     table = tomllib.loads(path.read_text())
-    assert list(table) == list(GROUPS) and table["surface"]["n_levels"] == 16 and table["constants"]["light_width"] == 256
+    assert (
+        list(table) == list(GROUPS) and table["surface"]["n_levels"] == 16 and table["constants"]["light_width"] == 256
+    )
     path.write_text('seed = 3\nlight_kind = "mlp"\nlight_width = 32\n')
     assert Config.read(path) == Config().replace({"run.seed": 3, "light.kind": "mlp", "constants.light_width": 32})
 
@@ -269,12 +340,17 @@ def test_files_that_hold_no_settings_are_named(tmp_path, text, message):
 
 def test_settings_as_they_are_typed():
     typed = {
-        "n_levels=4": ("surface.n_levels", 4), "surface.n_levels = 4": ("surface.n_levels", 4),
-        "box=2.5": ("constants.box", 2.5), "light.kind=mlp": ("light.kind", "mlp"), 'light.kind="mlp"': ("light.kind", "mlp"),
-        "indirect=false": ("occlusion.indirect", False), "light={kind='mlp'}": ("light", {"kind": "mlp"}),
-        "no_such=1": ("no_such", 1), "query=": ("shading.query", ""),
+        "n_levels=4": ("surface.n_levels", 4),
+        "surface.n_levels = 4": ("surface.n_levels", 4),
+        "box=2.5": ("constants.box", 2.5),
+        "light.kind=mlp": ("light.kind", "mlp"),
+        'light.kind="mlp"': ("light.kind", "mlp"),
+        "indirect=false": ("occlusion.indirect", False),
+        "light={kind='mlp'}": ("light", {"kind": "mlp"}),
+        "no_such=1": ("no_such", 1),
+        "query=": ("shading.query", ""),
         f"n_levels={'1' * 5000}": ("surface.n_levels", "1" * 5000),  # more digits than Python makes a number of
-    }  # fmt: skip
+    }
     for text, expected in typed.items():
         name, value = parse_setting(text)
         assert (name, value) == expected and type(value) is type(expected[1]), text

@@ -7,15 +7,14 @@ import torch
 import trimesh
 from mesh_shapes import scene_of
 from op_checks import generator, unit
-from test_views import ball
-from tiny_runs import tiny
-
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
+from test_views import ball
+from tiny_runs import tiny
 
 
 def bowl() -> trimesh.Trimesh:
@@ -85,7 +84,9 @@ def test_the_sum_holds_what_the_mesh_sends():
 def test_visibility_is_asked_on_the_viewers_side():
     model = with_mesh(trimesh.creation.icosphere(2, 0.5))
     asked, visibility = [], model.occlusion.visibility
-    model.occlusion.visibility = lambda positions, normals: asked.append((positions, normals)) or visibility(positions, normals)
+    model.occlusion.visibility = lambda positions, normals: (
+        asked.append((positions, normals)) or visibility(positions, normals)
+    )
     views, points = points_at(torch.full((6, 1), 0.9), 0.0)
     at = torch.tensor([4, 1, 2])
     model.quadrature_correction(model.evaluate_light(), views, points._replace(normals=-points.normals), at)
@@ -111,7 +112,11 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     model, cells = ball()
     model.config = model.config.replace({"shading.method": "summed"})
     model.occlusion.ready = model.occlusion.is_unoccluded = True
-    rays = torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]), torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
+    rays = (
+        torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]),
+        torch.tensor([[-1.0, 0, 0]] * 3),
+        torch.full((3,), 0.5),
+    )
     asked = {}
 
     def added(light, views, points, candidates, *_):
@@ -119,7 +124,9 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
         return candidates, torch.tensor([[1.0] * 3, [3.0] * 3])
 
     light, found = model.evaluate_light(), find_samples(model, cells, *rays)
-    monkeypatch.setattr(model, "quadrature_correction", lambda *args: (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3)))
+    monkeypatch.setattr(
+        model, "quadrature_correction", lambda *args: (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3))
+    )
     without = render_rays(model, light, found, shades_per_ray=2).mean
     monkeypatch.setattr(model, "quadrature_correction", added)
     ray = render_rays(model, light, found, shades_per_ray=2)
@@ -188,7 +195,10 @@ def test_normals_are_taken_as_set(name):
     with torch.no_grad():
         model.sdf_field.grid.table.normal_(std=0.02)
     x = torch.rand(50, 3) - 0.5
-    gradients = {"analytic": model.sdf_field.sample(x).gradient, "finite_difference": model.sdf_field.sample_finite_difference(x).gradient}
+    gradients = {
+        "analytic": model.sdf_field.sample(x).gradient,
+        "finite_difference": model.sdf_field.sample_finite_difference(x).gradient,
+    }
     assert torch.equal(model.surface(x).gradient, gradients[name])
     assert (gradients["analytic"] - gradients["finite_difference"]).abs().max() > 0.01
 

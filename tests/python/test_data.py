@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import trimesh
 from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha
-
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
@@ -232,7 +231,9 @@ def test_linear_photos_of_floats(tmp_path, peak):
     white = linear_to_srgb((1 / found.exposures).astype(np.float32))
     for i, truth in enumerate(linear):
         inside = truth[..., 3] > 0.4
-        np.testing.assert_allclose(srgb_to_linear(found.images[i][inside][:, :3]), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak)
+        np.testing.assert_allclose(
+            srgb_to_linear(found.images[i][inside][:, :3]), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak
+        )
         assert (found.images[i][inside][:, :3] < 0.99 * white[i]).all()
 
 

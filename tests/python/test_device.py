@@ -9,24 +9,23 @@ import os
 import pytest
 import torch
 from pretend_gpu import GPU, GpuTensor, pretend_gpu
-from tiny_runs import tiny
-
-from splitnerf.training import losses
-from splitnerf.training import loop as trainer
-from splitnerf.training import step as steps
-from splitnerf.devices import in_background
-from splitnerf.training.checkpoint import load_checkpoint
-from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.gpu_step import GpuStep
-from splitnerf.training.step import Capacity
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
+from splitnerf.devices import in_background
 from splitnerf.fields import visibility
 from splitnerf.ops import CELL_OCCUPIED
+from splitnerf.pipeline import reconstruct
 from splitnerf.render import model, occupancy, renderer
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
-from splitnerf.pipeline import reconstruct
+from splitnerf.training import loop as trainer
+from splitnerf.training import losses
+from splitnerf.training import step as steps
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.step import Capacity
+from tiny_runs import tiny
 
 
 def test_two_devices_in_one_call_are_told(monkeypatch):
@@ -35,10 +34,12 @@ def test_two_devices_in_one_call_are_told(monkeypatch):
         assert there.device == GPU and here.device.type == "cpu" and (there * 2).device == GPU
         assert torch.zeros_like(there).is_cuda and not there.cpu().is_cuda and there.to("cpu") is not there
         for wrong in (
-            lambda: here + there, lambda: torch.cat([here, there]), lambda: there[torch.tensor([0, 1])],
+            lambda: here + there,
+            lambda: torch.cat([here, there]),
+            lambda: there[torch.tensor([0, 1])],
             lambda: torch.rand(3, generator=torch.Generator("cuda")),
             lambda: torch.rand(3, generator=torch.Generator(), device="cuda"),
-        ):  # fmt: skip
+        ):
             with pytest.raises(RuntimeError, match="two devices"):
                 wrong()
         with pytest.raises(TypeError, match="on the GPU"):
@@ -51,9 +52,18 @@ def test_two_devices_in_one_call_are_told(monkeypatch):
 # mesh is made. Preset paper finds all samples of its rays and shades each, so that its steps wait for two counts anyway; each update of
 # its grid draws among the occupied cells, and from the mesh on a panorama of its light is painted every 16 steps.
 WAITS = {
-    "cpu": {"item": 1}, "fast": {"item": 1},
-    "paper": {"item": 1, "march_rays": 200, "spread_samples": 200, "nonzero": 13, "unique": 13, "__float__": 13, "to": 9},
-}  # fmt: skip
+    "cpu": {"item": 1},
+    "fast": {"item": 1},
+    "paper": {
+        "item": 1,
+        "march_rays": 200,
+        "spread_samples": 200,
+        "nonzero": 13,
+        "unique": 13,
+        "__float__": 13,
+        "to": 9,
+    },
+}
 
 
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
@@ -85,7 +95,16 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
     monkeypatch.setattr(trainer.Training, "advance", watched)
     monkeypatch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # takes its mesh at once
     settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
-    config = tiny(name, steps=250, mesh_every=0.5, preview_every=1.0, checkpoint_minutes=1e3, **{"mesh.background": True}, indirect_every=50, **settings)
+    config = tiny(
+        name,
+        steps=250,
+        mesh_every=0.5,
+        preview_every=1.0,
+        checkpoint_minutes=1e3,
+        **{"mesh.background": True},
+        indirect_every=50,
+        **settings,
+    )
     with pretend_gpu(monkeypatch) as gpu:
         trained = trainer.train(load_dataset(data), config, tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
@@ -141,7 +160,9 @@ def test_padding_is_computed_only_where_it_saves_a_wait(data, tmp_path, monkeypa
 
     monkeypatch.setattr(GpuStep, "differentiate", watched)
     with pretend_gpu(monkeypatch):
-        trainer.train(load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda")
+        trainer.train(
+            load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda"
+        )
     assert asked[0] == (False, False, True) and set(asked[4:]) == {(pads, pads, not pads)}
 
 
@@ -160,8 +181,12 @@ def test_segments_grow_where_sizes_never_repeat(data, tmp_path, monkeypatch, nam
     assert asked == ["expandable_segments:True"] * (name == "paper" and device == "cuda" and own is None)
 
 
-@pytest.mark.parametrize(("device", "processors", "threads"), [("cuda", 6, 4), ("cuda", 16, 8), ("cuda", 1, 1), ("cpu", 6, 8)])
-def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(data, tmp_path, monkeypatch, device, processors, threads):
+@pytest.mark.parametrize(
+    ("device", "processors", "threads"), [("cuda", 6, 4), ("cuda", 16, 8), ("cuda", 1, 1), ("cpu", 6, 8)]
+)
+def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
+    data, tmp_path, monkeypatch, device, processors, threads
+):
     """By all threads that work beside it, and until the last step is made."""
     seen, advance, before = set(), trainer.Training.advance, torch.get_num_threads()
 

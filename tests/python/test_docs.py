@@ -17,12 +17,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from doc_blocks import PAGES, ROOT, Block, blocks_of, inline_commands, name_of
-from tiny_runs import SMALL, as_options, train
-
 import splitnerf.ops as ops
+from doc_blocks import PAGES, ROOT, Block, blocks_of, inline_commands, name_of
 from splitnerf.cli import DONE, build_parser, main
 from splitnerf.data.images import write_image
+from tiny_runs import SMALL, as_options, train
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -160,10 +159,22 @@ def test_the_reference_holds_every_operator():
 
 
 @pytest.mark.skipif(
-    any(importlib.util.find_spec(name) is None for name in SPHINX), reason="Sphinx is not there: pip install splitnerf[docs]"
+    any(importlib.util.find_spec(name) is None for name in SPHINX),
+    reason="Sphinx is not there: pip install splitnerf[docs]",
 )
 def test_the_pages_build_without_a_warning(tmp_path):
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", str(ROOT / "docs"), str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-b",
+        "html",
+        str(ROOT / "docs"),
+        str(tmp_path),
+    ]
     built = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
     assert built.returncode == 0, built.stderr
     page = (tmp_path / "reference" / "rays.html").read_text()

@@ -13,9 +13,6 @@ import pytest
 import torch
 from op_checks import has_cuda_kernel
 from pretend_gpu import pretend_gpu
-from torch.utils._python_dispatch import TorchDispatchMode
-from torch.utils._pytree import tree_leaves
-
 from splitnerf import _core, devices
 from splitnerf.cli import main
 from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED
@@ -25,6 +22,8 @@ from splitnerf.errors import InputError
 from splitnerf.export.unwrap import unwrap
 from splitnerf_tools.doctor import machine, self_test
 from splitnerf_tools.plugin import failing_operators
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves
 
 OPERATORS = sorted(
     name.split("::")[1] for name in torch._C._dispatch_get_all_op_names() if name.startswith("splitnerf::")
@@ -124,7 +123,17 @@ def test_all_is_well_here(capsys):
     assert main(["doctor"]) == DONE
     said = capsys.readouterr().out
     assert f"{len(self_test.answers())} operators, all as they should be" in said
-    for name in ("splitnerf", "Python", "torch", "kernels", "CUDA", "ray tracing", "texture coordinates", "memory", "disk"):
+    for name in (
+        "splitnerf",
+        "Python",
+        "torch",
+        "kernels",
+        "CUDA",
+        "ray tracing",
+        "texture coordinates",
+        "memory",
+        "disk",
+    ):
         assert f"\n{name} " in f"\n{said}"
     lines = [line for line in said.splitlines() if "->" not in line]
     assert all(line[23] == " " and line[24] != " " for line in lines)  # values stand below each other
@@ -184,12 +193,19 @@ def test_kernels_below_the_processor(monkeypatch):
 @pytest.mark.parametrize(
     ("architectures", "capability", "covered"),
     [
-        ("90-real", (9, 0), True), ("90-real", (10, 0), False), ("80-real, 90", (8, 6), True),
-        ("80-real, 90", (12, 0), True), ("80-real, 90", (7, 5), False), ("86-real", (8, 0), False),
-        ("80-virtual", (7, 5), False), ("90a-real", (9, 0), True), ("80-virtual", (8, 9), True),
-        ("100-real", (10, 3), True), ("", (9, 0), False),
+        ("90-real", (9, 0), True),
+        ("90-real", (10, 0), False),
+        ("80-real, 90", (8, 6), True),
+        ("80-real, 90", (12, 0), True),
+        ("80-real, 90", (7, 5), False),
+        ("86-real", (8, 0), False),
+        ("80-virtual", (7, 5), False),
+        ("90a-real", (9, 0), True),
+        ("80-virtual", (8, 9), True),
+        ("100-real", (10, 3), True),
+        ("", (9, 0), False),
     ],
-)  # fmt: skip
+)
 def test_which_gpus_kernels_run_on(architectures, capability, covered):
     assert devices.covers(architectures, *capability) == covered
 
@@ -257,26 +273,36 @@ class TestChoice:
 
     def test_a_gpu_that_passes_is_taken(self, gpu):
         gpu()
-        assert fit_device(failing_operators) == ("cuda", f"the Big GPU passes the test of {len(self_test.operators('cuda'))} operators")
+        assert fit_device(failing_operators) == (
+            "cuda",
+            f"the Big GPU passes the test of {len(self_test.operators('cuda'))} operators",
+        )
         assert fit_device(None) == ("cuda", "the build has kernels for the Big GPU")
 
     @pytest.mark.parametrize(
         ("changes", "why"),
         [
-            ({"built": ""}, "this build has no GPU kernels"), ({"there": False}, "torch finds no GPU"),
+            ({"built": ""}, "this build has no GPU kernels"),
+            ({"there": False}, "torch finds no GPU"),
             ({"capability": (8, 6)}, "this build has no kernels for the Big GPU"),
             ({"failed": ["composite"]}, "the Big GPU fails the test of composite (splitnerf doctor)"),
-            ({"failed": ["composite", "adamw_steps_", "sdf_field"]},
-             "the Big GPU fails the test of composite and 2 more (splitnerf doctor)"),
+            (
+                {"failed": ["composite", "adamw_steps_", "sdf_field"]},
+                "the Big GPU fails the test of composite and 2 more (splitnerf doctor)",
+            ),
         ],
-    )  # fmt: skip
+    )
     def test_else_the_cpu_is(self, gpu, changes, why):
         gpu(**changes)
         assert fit_device(failing_operators) == ("cpu", why)
 
     def test_the_command_says_which(self, gpu, capsys):
         gpu(failed=["composite"])
-        assert device_for("auto", False) == "cpu" and device_for("cuda", False) == "cuda" and device_for("cpu", True) == "cpu"
+        assert (
+            device_for("auto", False) == "cpu"
+            and device_for("cuda", False) == "cuda"
+            and device_for("cpu", True) == "cpu"
+        )
         assert "note: trains on the CPU: the Big GPU fails the test of composite" in capsys.readouterr().err
         gpu()
         assert device_for("auto", False) == "cuda"

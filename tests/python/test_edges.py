@@ -10,7 +10,6 @@ import torch
 from blender_data import SIZE
 from layout_scenes import write_transforms
 from op_checks import generator
-
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.render.edges import band, edge_of, filled_in
@@ -55,7 +54,9 @@ def test_what_lies_behind_is_beside_the_finest_parts_too():
     alpha = np.zeros((20, 30), np.float32)
     alpha[:, 15] = 0.4
     near, outside = band(alpha, 2)
-    assert np.array_equal(near.any(0).nonzero()[0], [15]) and np.array_equal((~outside).any(0).nonzero()[0], range(11, 20))
+    assert np.array_equal(near.any(0).nonzero()[0], [15]) and np.array_equal(
+        (~outside).any(0).nonzero()[0], range(11, 20)
+    )
 
 
 def test_before_what_is_too_bright_for_the_photo_the_mask_decides():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-
 from splitnerf.data.environment import read_environment, rotate_environment, sample_environment
 from splitnerf.data.images import write_image
 

@@ -9,11 +9,10 @@ import pytest
 import trimesh
 from blender_data import edit, set_pose
 from layout_scenes import COUNT, write_colmap, write_transforms
-from tiny_runs import train
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config
 from splitnerf.data.reading import Reading
+from tiny_runs import train
 
 STEPS = ("--steps", "2")
 EAST = np.eye(4, k=3)  # a pose's step along x

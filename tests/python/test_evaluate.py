@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import srgb_to_linear, write_image
@@ -79,11 +78,13 @@ def views(tmp_path):
 
 
 def test_maps_of_the_data_are_those_with_truth(views):
-    assert relight_maps(views) == {
-        "city": views.root / "relight_city.hdr", "my_sun": views.root / "relight_my_sun.exr",
-    }  # fmt: skip
+    assert relight_maps(views) == {"city": views.root / "relight_city.hdr", "my_sun": views.root / "relight_my_sun.exr"}
     assert read_relit(views, 3, "city")[0, 0] == pytest.approx([0.35, 0.35, 0.35, 1], abs=0.002)
-    assert read_relit(replace(views, downscale=2, images=views.images[:, ::2, ::2], sizes=None), 3, "city").shape == (8, 8, 4)
+    assert read_relit(replace(views, downscale=2, images=views.images[:, ::2, ::2], sizes=None), 3, "city").shape == (
+        8,
+        8,
+        4,
+    )
     with pytest.raises(InputError, match="r_2_relit_night.png: no such image, the truth of r_2 under night"):
         read_relit(views, 2, "night")
     write_image(views.image_paths[1].with_name("r_1_relit_city.png"), np.ones((4, 4, 4)))
@@ -154,10 +155,17 @@ def test_renderings_become_straight_srgb():
 
 
 FULL = {
-    "novel_view": {"psnr": 30.0, "ssim": 0.9, "lpips": 0.05}, "albedo": None,
-    "relight": {"psnr": 27.126, "ssim": 0.9412, "lpips": None}, "normal_mae_deg": 4.0, "roughness_mae": 0.1,
-    "metallic_balanced_accuracy": None, "light_psnr": 20.0, "chamfer": 0.01, "f_score": 0.97, "seconds": 90.0,
-}  # fmt: skip
+    "novel_view": {"psnr": 30.0, "ssim": 0.9, "lpips": 0.05},
+    "albedo": None,
+    "relight": {"psnr": 27.126, "ssim": 0.9412, "lpips": None},
+    "normal_mae_deg": 4.0,
+    "roughness_mae": 0.1,
+    "metallic_balanced_accuracy": None,
+    "light_psnr": 20.0,
+    "chamfer": 0.01,
+    "f_score": 0.97,
+    "seconds": 90.0,
+}
 
 
 def test_table():

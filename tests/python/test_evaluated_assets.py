@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, write_image
@@ -37,10 +36,14 @@ class Answers:
 
         level = 0.1 * environment.mean() + 0.05 * (len(self.asked) - 1)
         return {
-            "radiance": constant(0.5 * level, 0.25 * level, 2.0), "alpha": constant(0.5)[..., 0], "albedo": constant(0.1, 0.2, 0.3),
-            "roughness": constant(0.4)[..., 0], "metallic": constant(0.7)[..., 0], "normal": constant(0, 0, 1),
+            "radiance": constant(0.5 * level, 0.25 * level, 2.0),
+            "alpha": constant(0.5)[..., 0],
+            "albedo": constant(0.1, 0.2, 0.3),
+            "roughness": constant(0.4)[..., 0],
+            "metallic": constant(0.7)[..., 0],
+            "normal": constant(0, 0, 1),
             "smooth_normal": 0.5 * constant(*TILTED),
-        }  # fmt: skip
+        }
 
 
 @pytest.fixture
@@ -57,7 +60,9 @@ def views(tmp_path) -> Dataset:
     poses = np.tile(np.eye(4, dtype=np.float32), (3, 1, 1))
     poses[:, :3, 3] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
     lenses = np.float32([[10, 11, 8, 6], [12, 13, 7, 5], [14, 15, 9, 4]])
-    return Dataset("toy", tmp_path, "test", 1, images, poses, lenses, [p.stem for p in paths], paths, np.diag([0.5, 0.5, 0.5, 1.0]))
+    return Dataset(
+        "toy", tmp_path, "test", 1, images, poses, lenses, [p.stem for p in paths], paths, np.diag([0.5, 0.5, 0.5, 1.0])
+    )
 
 
 def maps_of(views: Dataset) -> dict[str, Path]:
@@ -74,7 +79,9 @@ def test_an_assets_maps_are_those_of_each_view(views):
     seeds = {asked[-1] for asked in renderer.asked}
     assert len(seeds) == len(predictions) == 3 and min(seeds) >= 2**31
     prediction = predictions[0]
-    assert prediction["normal"][3, 4] == pytest.approx(TILTED) and prediction["rgb"][3, 4] == pytest.approx(linear_to_srgb(np.float32([0.8, 0.4, 1])))
+    assert prediction["normal"][3, 4] == pytest.approx(TILTED) and prediction["rgb"][3, 4] == pytest.approx(
+        linear_to_srgb(np.float32([0.8, 0.4, 1]))
+    )
     known = {"alpha": 0.5, "albedo": [0.1, 0.2, 0.3], "roughness": 0.4, "metallic": 0.7}
     assert all(prediction[name][3, 4] == pytest.approx(value) for name, value in known.items())
     assert "rgb" not in asset_predictions(Answers(), views, None, spp=1)[0]
@@ -111,14 +118,22 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
     mesh = trimesh.load(data / "mesh.ply", process=False)
     n = len(mesh.vertices)
     asset = Asset(
-        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), np.float32(mesh.vertex_normals),
-        np.zeros(len(mesh.faces), np.int32), [Material("grey", (0.5, 0.5, 0.5), 0.5)],
-    )  # fmt: skip
+        "ball",
+        np.float32(mesh.vertices),
+        np.int32(mesh.faces),
+        np.float32(mesh.vertex_normals),
+        np.zeros(len(mesh.faces), np.int32),
+        [Material("grey", (0.5, 0.5, 0.5), 0.5)],
+    )
     assert n > 100
     path = tmp_path / "ball.glb"
     write_glb(path, asset)
     bare = evaluate_asset(path, data, Protocol(spp=1, views=1))
-    assert bare.dataset.split == "test" and len(bare.predictions) == 1 and bare.scores["novel_view"] is bare.scores["light_psnr"] is None
+    assert (
+        bare.dataset.split == "test"
+        and len(bare.predictions) == 1
+        and bare.scores["novel_view"] is bare.scores["light_psnr"] is None
+    )
     assert bare.scores["chamfer"] < 0.02 and bare.scores["f_score"] > 0.9
     light = read_image(data / "light.hdr")
     write_image(tmp_path / "environment.exr", light)
@@ -155,7 +170,14 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(views, monkeypatch):
     mask[0] = True
     truths = [ViewTruth("a", colour, grey, 2 * grey, normal, mask)] * 5
     alpha = np.full((HEIGHT, WIDTH), 0.8, np.float32)
-    prediction = {"rgb": 3 * colour, "alpha": alpha, "albedo": 2 * colour, "roughness": 3 * grey, "metallic": grey, "normal": -normal}
+    prediction = {
+        "rgb": 3 * colour,
+        "alpha": alpha,
+        "albedo": 2 * colour,
+        "roughness": 3 * grey,
+        "metallic": grey,
+        "normal": -normal,
+    }
     images = [np.full((HEIGHT, WIDTH, 4), 51 * i, np.uint8) for i in range(5)]
     evaluation = {"relight": {"lsq": {"scale": [2.0] * 3}}, "albedo": {"lsq": {"scale": [0.5, 1.0, 2.0]}}}
     write_sheet(views.root / "s.png", data, [prediction] * 5, truths, evaluation, RelitViews({"day": images}, data, 1))
@@ -167,9 +189,12 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(views, monkeypatch):
         return over_background(np.clip(linear_to_srgb(np.float32(linear)), 0, 1), np.float32(coverage))
 
     relit = [
-        (on_white([srgb_to_linear(np.float32(0.3 + 0.2 * (i % 3)))] * 3, 0.3 + 0.2 * (i % 3)),
-         on_white([2 * srgb_to_linear(np.float32(0.2 * i))] * 3, 0.2 * i)) for i in (0, 2, 4)
-    ]  # fmt: skip
+        (
+            on_white([srgb_to_linear(np.float32(0.3 + 0.2 * (i % 3)))] * 3, 0.3 + 0.2 * (i % 3)),
+            on_white([2 * srgb_to_linear(np.float32(0.2 * i))] * 3, 0.2 * i),
+        )
+        for i in (0, 2, 4)
+    ]
     expected = {
         "novel view": [(np.full(3, 0.75), np.full(3, 0.8)) for _ in range(3)],
         "relit by\nday": relit,

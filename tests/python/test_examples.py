@@ -16,12 +16,11 @@ import pytest
 import torch
 import trimesh
 from painted_ball import lamps, looking, orange
-from tiny_runs import SMALL, as_options
-
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
 from splitnerf.export.glb import write_glb
 from splitnerf_tools.demo.scene import write_demo_dataset
+from tiny_runs import SMALL, as_options
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BLENDER = os.environ.get("SPLITNERF_BLENDER_PYTHON") or sys.executable  # bpy 5.0 wants an older NumPy than OpenImageIO
@@ -202,12 +201,22 @@ def test_slurm_batch(run, data, tmp_path, monkeypatch):
     assert not (tmp_path / "out/jobs").exists()  # a scene may be called so
     assert out.splitlines()[0] == "tiny: done" and out.splitlines()[1].startswith("bad: failed (2), see ")
 
-    warned = subprocess.run([sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120)
+    warned = subprocess.run(
+        [sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120
+    )
     assert warned.stdout == f"Training ('a', 'b', ['c']) {-signal.SIGTERM}\n", warned.stderr
 
 
 def test_a_scene_called_as_the_folder_of_jobs_is_refused(tmp_path):
     pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
-    words = [sys.executable, str(EXAMPLES / "slurm_batch.py"), str(tmp_path / ".jobs"), "--out", str(tmp_path / "out"), "--cluster", "local"]
+    words = [
+        sys.executable,
+        str(EXAMPLES / "slurm_batch.py"),
+        str(tmp_path / ".jobs"),
+        "--out",
+        str(tmp_path / "out"),
+        "--cluster",
+        "local",
+    ]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
     assert done.returncode == 2 and "a scene is called .jobs" in done.stderr and not (tmp_path / "out").exists()

@@ -18,15 +18,15 @@ from PIL import Image
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material
-from splitnerf.data.images import linear_to_srgb, read_radiance, read_image
+from splitnerf.data.images import linear_to_srgb, read_image, read_radiance
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.obj import write_obj
+from splitnerf.export.scene import write_assets
 from splitnerf.export.usdz import write_usdz
 from splitnerf.fields import Light
-from splitnerf.export.scene import write_assets
 from splitnerf.render.model import SceneModel
 from splitnerf.render.seen import Cameras
 from splitnerf.training.checkpoint import save_checkpoint
@@ -69,11 +69,14 @@ def asset(ball):
     rng = np.random.default_rng(0)
     uv = rng.random((len(vertices), 2)).astype(np.float32)
     material = Material(
-        "paint", (0.5, 0.25, 1.0), 0.9, 0.8,
+        "paint",
+        (0.5, 0.25, 1.0),
+        0.9,
+        0.8,
         albedo_texture=rng.random((8, 8, 3)).astype(np.float32),
         roughness_metallic_texture=rng.random((8, 8, 2)).astype(np.float32),
         normal_texture=np.float32(np.dstack([np.full((8, 8), 0.6), np.zeros((8, 8)), np.full((8, 8), 0.8)])),
-    )  # fmt: skip
+    )
     vertices, normals, faces = np.float32(vertices), np.float32(normals), np.int32(faces)
     tangents = vertex_tangents(vertices, faces, normals, uv)
     return Asset("ball", vertices, faces, normals, np.zeros(len(faces), np.int32), [material], uv, tangents)
@@ -171,6 +174,8 @@ def test_bad_assets_write_nothing(tmp_path, asset, write):
 
 
 CAMERAS = Cameras(torch.eye(4)[None], torch.tensor([[8.0, 8, 8, 8]]), torch.tensor([16, 16]))
+
+
 @pytest.mark.parametrize("flip", [False, True])
 @pytest.mark.parametrize("is_open", [False, True])
 def test_a_ply_points_outward_in_its_frame_with_encoded_colours(tmp_path, ball, flip, is_open):
@@ -226,23 +231,34 @@ def save_run(run, **state):
     """A run that was never trained: its surface is a sphere of radius 0.7 about the box's centre."""
     torch.manual_seed(0)
     config = Config().replace(
-        {
-            "surface.n_levels": 4,
-            "surface.log2_table_size": 10,
-            "sampling.grid_resolution": 16,
-            "export.resolution": 48,
-        }
+        {"surface.n_levels": 4, "surface.log2_table_size": 10, "sampling.grid_resolution": 16, "export.resolution": 48}
     )
     run.mkdir()
     model = SceneModel(config)
     content = dict(
-        step=0, seconds=0.0, n_rays=64, meshed_at=0.0, previewed_at=0.0, psnr_mean=None, stopped=False, exposures=torch.zeros(0, 4), model=model.state_dict(),
-        optimiser={"state": {}}, device="cpu", generator=torch.get_rng_state(), torch_generator=torch.get_rng_state(),
-        occupancy=torch.zeros(16**3), cells=torch.ones(16, 16, 16, dtype=torch.uint8),
-        environment=None, light_noise=torch.zeros(2, dtype=torch.float64),
-        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)}, mesh_vertices=None, mesh_faces=None,
-        cameras=CAMERAS._asdict(), **state,
-    )  # fmt: skip
+        step=0,
+        seconds=0.0,
+        n_rays=64,
+        meshed_at=0.0,
+        previewed_at=0.0,
+        psnr_mean=None,
+        stopped=False,
+        exposures=torch.zeros(0, 4),
+        model=model.state_dict(),
+        optimiser={"state": {}},
+        device="cpu",
+        generator=torch.get_rng_state(),
+        torch_generator=torch.get_rng_state(),
+        occupancy=torch.zeros(16**3),
+        cells=torch.ones(16, 16, 16, dtype=torch.uint8),
+        environment=None,
+        light_noise=torch.zeros(2, dtype=torch.float64),
+        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)},
+        mesh_vertices=None,
+        mesh_faces=None,
+        cameras=CAMERAS._asdict(),
+        **state,
+    )
     save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
     return run
 
@@ -259,11 +275,21 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     options = ["--out", str(out), "--faces", "1000", "--texture-size", "128", "--formats", "glb,ply,obj"]
     assert main(["export", str(run), *options]) == DONE
     line = capsys.readouterr().out.splitlines()[0]
-    assert line.startswith("mesh: watertight, 1000 faces of ") and line.endswith(", 0 floating or enclosed components dropped")
+    assert line.startswith("mesh: watertight, 1000 faces of ") and line.endswith(
+        ", 0 floating or enclosed components dropped"
+    )
     assert {p.name for p in out.iterdir()} == {
-        "mesh.glb", "mesh.ply", "mesh.obj", "mesh.mtl", "mesh_albedo.png", "mesh_roughness.png", "mesh_metallic.png",
-        "mesh_normal.png", "environment.exr", "environment.hdr",
-    }  # fmt: skip
+        "mesh.glb",
+        "mesh.ply",
+        "mesh.obj",
+        "mesh.mtl",
+        "mesh_albedo.png",
+        "mesh_roughness.png",
+        "mesh_metallic.png",
+        "mesh_normal.png",
+        "environment.exr",
+        "environment.hdr",
+    }
     full = trimesh.load(out / "mesh.ply", process=False)
     assert full.is_watertight and full.vertices.mean(axis=0) == pytest.approx([1, 0, -2], abs=0.05)
     document, arrays, _ = parse_glb(out / "mesh.glb")

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export import bake, maps
@@ -56,7 +55,9 @@ def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
     """A share that is x at x: at each texel's centre, but for the outer ones, which repeat what is next to them."""
 
     def factors(scene, points, normals, *args, offset, **kwargs):
-        assert (normals == torch.tensor([0.0, 0.0, 1.0])).all() and offset == 0.037  # traced off the surface along its normal
+        assert (
+            normals == torch.tensor([0.0, 0.0, 1.0])
+        ).all() and offset == 0.037  # traced off the surface along its normal
         return points[:, :1], None
 
     monkeypatch.setattr(bake, "occlusion_factors", factors)
@@ -112,9 +113,15 @@ def test_normals_are_those_of_the_places_that_vertices_move_to():
 
     mesh = trimesh.creation.icosphere(2, 0.85)
     found = textured_asset(
-        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), dataclasses.replace(surface, gradient=leaning), n_faces=0,
-        texture_size=64, spacing=0.05, occlusion_offset=0.01,
-    ).asset  # fmt: skip
+        "ball",
+        np.float32(mesh.vertices),
+        np.int32(mesh.faces),
+        dataclasses.replace(surface, gradient=leaning),
+        n_faces=0,
+        texture_size=64,
+        spacing=0.05,
+        occlusion_offset=0.01,
+    ).asset
     np.testing.assert_allclose(found.normals, found.vertices / 0.8, atol=2e-3)
 
 
@@ -122,7 +129,9 @@ def textured() -> Asset:
     mesh = square()
     texture = np.full((4, 4, 2), 0.25, np.float32)
     material = Material("paint", roughness_metallic_texture=texture)
-    return Asset("square", mesh.vertices, mesh.faces, mesh.normals, np.zeros(2, np.int32), [material], mesh.uv, mesh.tangents)
+    return Asset(
+        "square", mesh.vertices, mesh.faces, mesh.normals, np.zeros(2, np.int32), [material], mesh.uv, mesh.tangents
+    )
 
 
 def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():

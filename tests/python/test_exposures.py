@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 import torch
 from blender_data import edit, make_blender
-from tiny_runs import tiny, train
-
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.exposures import EXPOSURES, with_exposures
@@ -20,11 +18,12 @@ from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
 from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
-from splitnerf.training import exposure
 from splitnerf.render.edges import EdgePixels
 from splitnerf.render.rays import DrawnRays
+from splitnerf.training import exposure
 from splitnerf.training.batches import draw_batch
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
+from tiny_runs import tiny, train
 
 CPU = torch.device("cpu")
 
@@ -103,10 +102,16 @@ class TestLearning:
         found.learn(view, target, mean, opacity, torch.tensor(True))
         assert found.sums.any()
 
-    @pytest.mark.parametrize("refine, photographed, compositing, learned", [
-        ("auto", True, "linear", True), ("auto", False, "linear", False), ("yes", False, "linear", True),
-        ("no", True, "linear", False), ("auto", True, "srgb", False),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        "refine, photographed, compositing, learned",
+        [
+            ("auto", True, "linear", True),
+            ("auto", False, "linear", False),
+            ("yes", False, "linear", True),
+            ("no", True, "linear", False),
+            ("auto", True, "srgb", False),
+        ],
+    )
     def test_when_they_are_learned(self, refine, photographed, compositing, learned):
         config = settings(**{"exposure.refine": refine, "shading.compositing": compositing, "shading.method": "split"})
         assert PhotoExposures(photos([1, 1], photographed), config, CPU).learned == learned

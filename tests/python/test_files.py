@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-
 from splitnerf import files
 from splitnerf.data.images import read_image, write_image
 from splitnerf.errors import InputError
@@ -82,8 +81,11 @@ def test_an_error_names_the_file_and_its_cause_and_keeps_the_old_one(tmp_path, m
     def fails(*arguments, **options):
         raise OSError(number, os.strerror(number), str(tmp_path / ".a.xyz.glb"))
 
-    for place, (module, name) in {"making it": (tempfile, "mkstemp"), "to the disk": (os, "fsync"),
-                                  "taking the name": (os, "replace")}.items():  # fmt: skip
+    for place, (module, name) in {
+        "making it": (tempfile, "mkstemp"),
+        "to the disk": (os, "fsync"),
+        "taking the name": (os, "replace"),
+    }.items():
         if where == place:
             monkeypatch.setattr(module, name, fails)
     with pytest.raises(OSError) as caught, atomic_path(path) as temporary:
@@ -208,7 +210,10 @@ def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, monkeypatch):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(files, "open", fails, raising=False)
-    with pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"), locked(tmp_path / "a"):
+    with (
+        pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"),
+        locked(tmp_path / "a"),
+    ):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 

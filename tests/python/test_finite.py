@@ -12,17 +12,15 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 import torch
-from tiny_runs import lines_of, tiny, train
-
-from splitnerf.training import loop as trainer
-from splitnerf.training import state
-from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf.data.dataset import load_dataset
-from splitnerf.training import gpu_step
+from splitnerf.training import gpu_step, state
+from splitnerf.training import loop as trainer
+from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged, check_state, explain_loss
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.step import Capacity, Step, StepNumbers
+from tiny_runs import lines_of, tiny, train
 
 
 def goes_on(data: Path, run: Path, before: bytes) -> None:
@@ -123,7 +121,9 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
     assert all(p.isfinite().all() for p in trained.model.parameters())
     assert [line["skipped"] for line in lines_of(tmp_path)] == [0, 0, 0, 1, 1, 2, 3, 3]
     assert capsys.readouterr().err.count("step is skipped") == 3
-    counts = {int(moments["step"]) for moments in load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()}
+    counts = {
+        int(moments["step"]) for moments in load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()
+    }
     assert max(counts) == 5
 
 
@@ -139,7 +139,9 @@ def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monk
         monkeypatch.setattr(gpu_step, "READ_EVERY", every)
         (tmp_path / str(i)).mkdir()
         trainer.train(load_dataset(data), tiny(steps=41, **{"sampling.min_weight": 0.0}), tmp_path / str(i))
-        written.append([line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(i))])
+        written.append(
+            [line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(i))]
+        )
     assert [line["step"] for line in written[0]] == [*range(1, 21), 40, 41]
     assert written[1] == written[0] and written[2] == written[0]
     assert max(waiting[:41]) == 1 and max(waiting[41:]) == 16
@@ -156,7 +158,9 @@ def step_of(*gradients: list[float] | None) -> Step:
 def numbers_of(step: Step) -> StepNumbers:
     """The numbers of a step without terms and samples."""
     none = torch.zeros(0, dtype=torch.int64)
-    ray = SimpleNamespace(n_found=none.sum(), sizes=torch.zeros(3, dtype=torch.int64), evaluated=none, s=torch.ones(()), mean=none)
+    ray = SimpleNamespace(
+        n_found=none.sum(), sizes=torch.zeros(3, dtype=torch.int64), evaluated=none, s=torch.ones(()), mean=none
+    )
     return step.fetch(1, SimpleNamespace(target=none), ray, {}).read()
 
 
@@ -205,10 +209,11 @@ def test_a_parameter_or_a_moment_that_is_not_finite_is_named(stepped, value):
     model, optimiser = stepped
     check_state(4, model, optimiser)
     for name, tensor in (
-        ("parameter weight", model.weight), ("parameter bias", model.bias),
+        ("parameter weight", model.weight),
+        ("parameter bias", model.bias),
         ("exp_avg of weight", optimiser.state[model.weight]["exp_avg"]),
         ("exp_avg_sq of bias", optimiser.state[model.bias]["exp_avg_sq"]),
-    ):  # fmt: skip
+    ):
         kept = tensor.detach().clone()
         tensor.data.view(-1)[1] = value
         with pytest.raises(Diverged, match=rf"step 4: not finite: {name} \(1 of {tensor.numel()} values\)"):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import trimesh
 from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, triangle
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import srgb_to_linear
@@ -43,15 +42,21 @@ def test_what_the_program_writes_is_read_back(path):
     tangents = np.cross(normals, [0.3, 0.5, 0.8])
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     textures = {
-        "albedo_texture": srgb_to_linear(levels[0]), "roughness_metallic_texture": levels[1, ..., 1:],
+        "albedo_texture": srgb_to_linear(levels[0]),
+        "roughness_metallic_texture": levels[1, ..., 1:],
         "normal_texture": 2 * levels[2] - 1,
-    }  # fmt: skip
+    }
     material = Material("painted", (0.123456789, 0.5, 0.7), 0.345678901, 0.25, **textures)
     written = Asset(
-        "ball", normals * np.float32([1, 2, 3]), np.array(ball.faces, np.int32), normals,
-        np.zeros(len(ball.faces), np.int32), [material], uv=rng.random((n, 2), np.float32),
+        "ball",
+        normals * np.float32([1, 2, 3]),
+        np.array(ball.faces, np.int32),
+        normals,
+        np.zeros(len(ball.faces), np.int32),
+        [material],
+        uv=rng.random((n, 2), np.float32),
         tangents=np.column_stack([tangents, np.sign(normals[:, 0] + 1e-3)]).astype(np.float32),
-    )  # fmt: skip
+    )
     write_glb(path, written)
     asset = read_asset(path)
     assert asset.name == "a"
@@ -126,9 +131,7 @@ def test_interleaved_sparse_and_quantised_accessors(path):
     view = gltf.view(rows.tobytes(), byteStride=20)
     base = {"bufferView": view, "componentType": 5126, "count": 3}
     indices, values = gltf.view(np.array([1], "<u2").tobytes()), gltf.view(np.array([7, 8, 9], "<f4").tobytes())
-    sparse = {
-        "count": 1, "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values},
-    }  # fmt: skip
+    sparse = {"count": 1, "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values}}
     gltf.json["accessors"] += [base | {"type": "VEC3", "sparse": sparse}, base | {"type": "VEC2", "byteOffset": 12}]
     count = len(gltf.json["accessors"])
     primitive["attributes"] |= {"POSITION": count - 2, "TEXCOORD_0": count - 1}
@@ -166,13 +169,19 @@ def test_materials_textures_and_colour_spaces(path):
     levels = np.random.default_rng(0).integers(0, 256, (4, 2, 3)) / 255
     slot = {"index": gltf.texture(levels)}
     textured = gltf.material(
-        name="painted", emissiveFactor=[0.25, 0.5, 1.0], emissiveTexture=slot,
-        normalTexture=slot | {"scale": 0.5}, extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        name="painted",
+        emissiveFactor=[0.25, 0.5, 1.0],
+        emissiveTexture=slot,
+        normalTexture=slot | {"scale": 0.5},
+        extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
         pbrMetallicRoughness={
-            "baseColorFactor": [0.123456789, 0.5, 0.7, 0.3], "roughnessFactor": 0.345678901, "metallicFactor": 0.25,
-            "baseColorTexture": slot, "metallicRoughnessTexture": slot,
+            "baseColorFactor": [0.123456789, 0.5, 0.7, 0.3],
+            "roughnessFactor": 0.345678901,
+            "metallicFactor": 0.25,
+            "baseColorTexture": slot,
+            "metallicRoughnessTexture": slot,
         },
-    )  # fmt: skip
+    )
     plain = gltf.material(name="plain", pbrMetallicRoughness={"roughnessFactor": 0.5})
     normal = {"NORMAL": [[0, 0, 1]] * 3}
     parts = [
@@ -256,9 +265,13 @@ def test_repairs_are_said(path, capsys):
     assert (material.albedo, material.roughness, material.metallic) == ((1, 1, 1), 1.0, 1.0)
     said = capsys.readouterr().err
     for text in (
-        "no material; drawn as glTF's default", "morph targets; drawn in its base shape", "points or lines; left out",
-        "animations; drawn as it stands", "uses KHR_lights_punctual; left out", "normals of length 0",
-    ):  # fmt: skip
+        "no material; drawn as glTF's default",
+        "morph targets; drawn in its base shape",
+        "points or lines; left out",
+        "animations; drawn as it stands",
+        "uses KHR_lights_punctual; left out",
+        "normals of length 0",
+    ):
         assert text in said
     gltf = Gltf()
     gltf.node(mesh=gltf.mesh(gltf.primitive(material=gltf.material(name="glass", alphaMode="BLEND"))))

@@ -14,9 +14,17 @@ from tiny_runs import as_options
 
 BENCH = Path(__file__).parents[1] / "bench"
 SMALL = as_options(
-    dict(target_samples=256, max_rays=64, grid_resolution=16, mesh_resolution=24, light_resolution=16, log2_table_size=10, light_samples=64,
-         light_queries=64)
-)  # fmt: skip
+    dict(
+        target_samples=256,
+        max_rays=64,
+        grid_resolution=16,
+        mesh_resolution=24,
+        light_resolution=16,
+        log2_table_size=10,
+        light_samples=64,
+        light_queries=64,
+    )
+)
 
 
 def run(monkeypatch, main, *words: object) -> int:
@@ -27,10 +35,23 @@ def run(monkeypatch, main, *words: object) -> int:
 def test_every_operator_of_a_step_has_its_line(data, tmp_path, monkeypatch, capsys):
     assert run(monkeypatch, gpu_ops.main, data, "--out", tmp_path, "--steps", 6, "--seconds", 0.001) == 0
     page = (tmp_path / "ops.md").read_text()
-    lines = [dict(zip(gpu_ops.HEAD, line.strip("| ").split(" | "))) for line in page.splitlines() if line.startswith("| ")][2:]
+    lines = [
+        dict(zip(gpu_ops.HEAD, line.strip("| ").split(" | "))) for line in page.splitlines() if line.startswith("| ")
+    ][2:]
     names = {line["operator"] for line in lines}
-    assert names > {"sample_rays", "sdf_field", "sdf_field_backward", "light_lookup_backward", "summed_light", "cached_occlusion"}
-    assert all(float(line["error"]) < 1e-4 and float(line["share"]) > 0 for line in lines if line["operator"] != "light_lookup_backward")
+    assert names > {
+        "sample_rays",
+        "sdf_field",
+        "sdf_field_backward",
+        "light_lookup_backward",
+        "summed_light",
+        "cached_occlusion",
+    }
+    assert all(
+        float(line["error"]) < 1e-4 and float(line["share"]) > 0
+        for line in lines
+        if line["operator"] != "light_lookup_backward"
+    )
     assert f"{len(lines)} operators, 0 failed" in capsys.readouterr().out
     assert sum(bool(re.match(r"[\d.]+$", line["torch's"])) for line in lines) >= 8
 

@@ -8,11 +8,10 @@ from bench import gpu_step
 from bench.gpu_step import Answer, Row, answer, compared, error_of
 from pretend_gpu import pretend_gpu
 from pretend_graphs import graphs_on_the_cpu
-from tiny_runs import as_options, tiny
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render import model as rendering
 from splitnerf.training import losses
+from tiny_runs import as_options, tiny
 
 SETTINGS = gpu_step.ALWAYS | {"steps": 100, "table_dtype": "float16", "seed": 2}
 
@@ -104,7 +103,9 @@ def test_a_term_too_many_and_one_too_few_are_found(prepared, there, monkeypatch)
 def test_errors():
     ones, none = torch.ones(4), torch.zeros(4)
     assert error_of(ones * 1.5, ones) == 0.5 and error_of(none, none) == 0.0 and error_of(None, None) == 0.0
-    assert error_of(ones, none) == error_of(None, ones) == error_of(ones, None) == error_of(ones[:2], ones) == float("inf")
+    assert (
+        error_of(ones, none) == error_of(None, ones) == error_of(ones, None) == error_of(ones[:2], ones) == float("inf")
+    )
     assert not Row("", error_of(ones * float("nan"), ones), 0.0, 1.0).holds
 
 
@@ -139,8 +140,18 @@ def names_of(training, found: Answer) -> list[str]:
 
 
 def test_the_program(data, tmp_path, monkeypatch, capsys):
-    small = as_options(SETTINGS | {"n_levels": 4, "log2_table_size": 10, "target_samples": 512, "initial_rays": 64,
-                                   "grid_resolution": 16, "light_resolution": 16, "mesh_resolution": 24})  # fmt: skip
+    small = as_options(
+        SETTINGS
+        | {
+            "n_levels": 4,
+            "log2_table_size": 10,
+            "target_samples": 512,
+            "initial_rays": 64,
+            "grid_resolution": 16,
+            "light_resolution": 16,
+            "mesh_resolution": 24,
+        }
+    )
     command = ["gpu_step.py", str(data), "--device", "cpu", "--steps", "2", "--out", str(tmp_path), *small]
     monkeypatch.setattr("sys.argv", command)
     assert gpu_step.main() == 0 and "agree, the worst at 0." in capsys.readouterr().out

@@ -12,13 +12,12 @@ import pretend_graphs
 import pytest
 import torch
 from pretend_graphs import NoStream
-from tiny_runs import tiny
-from torch import Tensor
-
 from splitnerf.render.model import SceneModel
 from splitnerf.training import gpu_step
 from splitnerf.training.gpu_step import GpuStep, in_units
 from splitnerf.training.step import Capacity, StepNumbers
+from tiny_runs import tiny
+from torch import Tensor
 
 LIGHT_PERIOD = 4
 PRIORS_FROM = 0.5
@@ -49,14 +48,20 @@ class Fake(GpuStep):
 
     def find(self, batch: Rays, progress: float, capacity: int) -> Found:
         assert capacity in (0, PADDED)
-        self.given = batch, Found(torch.full((capacity or self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
+        self.given = (
+            batch,
+            Found(torch.full((capacity or self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)])),
+        )
         return self.given[1]
 
     def differentiate(self, batch, found, light, environment, step, progress, capacity):
         self.calls.append(capacity)
         self.model.zero_grad(set_to_none=True)
         looked_up = light(*LOOKUP).sum() + (light.cells.radiance * light.cells.solid_angles[:, None]).mean()
-        value = batch.target.sum() * found.directions.mean() * self.model.variance + batch.target.mean() * found.number.sum() * looked_up
+        value = (
+            batch.target.sum() * found.directions.mean() * self.model.variance
+            + batch.target.mean() * found.number.sum() * looked_up
+        )
         value.backward()
         return value.detach(), {"value": value.detach()}
 
@@ -65,7 +70,15 @@ class Fake(GpuStep):
         self.last = StepNumbers(1, 5, {}, {}, 0.0, Capacity(self.n_found, *counts), 20.0, 0.0)
         return self.capacity.holds(self.last.counts)
 
-    def taken(self, n_rays: int = 5, step: int = 0, progress: float = 0.0, counts: tuple | None = COUNTS, light=None, target=1.0):
+    def taken(
+        self,
+        n_rays: int = 5,
+        step: int = 0,
+        progress: float = 0.0,
+        counts: tuple | None = COUNTS,
+        light=None,
+        target=1.0,
+    ):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
@@ -84,9 +97,14 @@ def step(monkeypatch) -> Fake:
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     torch.manual_seed(0)
     config = tiny(
-        target_samples=1000, light_step_every=LIGHT_PERIOD, priors_from=PRIORS_FROM, **{"shading.method": "summed"},
-        table_dtype="float16", steps=100, cuda_graphs=True,
-    )  # fmt: skip
+        target_samples=1000,
+        light_step_every=LIGHT_PERIOD,
+        priors_from=PRIORS_FROM,
+        **{"shading.method": "summed"},
+        table_dtype="float16",
+        steps=100,
+        cuda_graphs=True,
+    )
     return Fake(SceneModel(config))
 
 
@@ -132,7 +150,9 @@ def decide(step: Fake, what: str) -> dict:
         step.mesh.made_at = 0.25
     elif what == "occlusion":
         step.model.occlusion.ready = True
-    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(what, {})
+    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
+        what, {}
+    )
 
 
 @pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "light", "priors", "rays"])
@@ -145,7 +165,9 @@ def test_another_decision_is_another_graph(step, what):
 def test_steps_that_decide_alike_share_a_graph(step):
     """The light moves with the 4th, the 8th and the last step, for which it stands for 4, 4 and one steps."""
     ways(step, 3)
-    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == ["repeated"] * 3
+    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == [
+        "repeated"
+    ] * 3
     assert [step.taken(step=3).how for _ in range(2)] == ["called", "recorded"]
     assert step.taken(step=7).how == step.taken(step=95).how == "repeated"
     assert step.taken(step=99).how == "repeated" and step.taken(step=98).how == "repeated"
@@ -190,7 +212,10 @@ def test_a_pool_whose_graphs_are_all_gone_is_not_recorded_into(step):
     assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step._pool == first
     step._graphs.clear()
     assert ways(step, 1) == ["recorded"] and step._pool != first
-    assert step.taken(counts=(1164.0, 300.0)).complete and ways(step, 2) == ["recorded", "repeated"]  # the only one, anew
+    assert step.taken(counts=(1164.0, 300.0)).complete and ways(step, 2) == [
+        "recorded",
+        "repeated",
+    ]  # the only one, anew
 
 
 def test_four_graphs_are_kept_and_the_oldest_makes_room(step):
@@ -267,9 +292,15 @@ def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
 def test_a_capacity_comes_in_units_and_holds_all_or_not():
     assert [in_units(n) for n in (0, 1, 256, 256.9, 257, 1150)] == [0, 256, 256, 256, 512, 1280]
     capacity = Capacity(5, 10, 20)
-    assert capacity.holds(Capacity(5, 10, 20)) and capacity.holds(Capacity(0, 0, 0)) and Capacity().holds(Capacity(1e9, 1e9, 1e9))
+    assert (
+        capacity.holds(Capacity(5, 10, 20))
+        and capacity.holds(Capacity(0, 0, 0))
+        and Capacity().holds(Capacity(1e9, 1e9, 1e9))
+    )
     assert not any(capacity.holds(more) for more in (Capacity(6, 10, 20), Capacity(5, 11, 20), Capacity(5, 10, 21)))
-    assert Capacity(5.5, 11, 22).holds(capacity, slack=1.1) and not Capacity(5.5, 11, 22).holds(Capacity(5, 10, 20.1), slack=1.1)
+    assert Capacity(5.5, 11, 22).holds(capacity, slack=1.1) and not Capacity(5.5, 11, 22).holds(
+        Capacity(5, 10, 20.1), slack=1.1
+    )
     assert Capacity().of_shading is None and capacity.of_shading == (10, 20)
 
 

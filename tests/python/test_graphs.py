@@ -12,24 +12,22 @@ import pytest
 import torch
 from launches import Launches
 from pretend_gpu import pretend_gpu
-from test_start import shape_of_ball
-from tiny_runs import lines_of, tiny
-
-from splitnerf.ops import AdamW
-from splitnerf.training import gpu_step
-from splitnerf.training import loop as trainer
-from splitnerf.training import state
-from splitnerf.training.batches import draw_batch
-from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.fields import VisibilityBits
-from splitnerf.training.gpu_step import GpuStep
-from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
+from splitnerf.training import gpu_step, state
+from splitnerf.training import loop as trainer
+from splitnerf.training.batches import draw_batch
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
+from test_start import shape_of_ball
+from tiny_runs import lines_of, tiny
 
 
 @pytest.fixture
@@ -50,10 +48,14 @@ def same_lines(folder) -> None:
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
 
 
-@pytest.mark.parametrize("settings", [
-    {}, {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
-    {"table_dtype": "float16", "sampling.min_weight": 0.0, "grid_every": 3, "target_samples": 16384},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
+        {"table_dtype": "float16", "sampling.min_weight": 0.0, "grid_every": 3, "target_samples": 16384},
+    ],
+)
 def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):
     """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
     settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 25, "start_levels": 1} | settings
@@ -117,12 +119,21 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         patch.setattr(gpu_step, "record", apart(gpu_step.record))
         patch.setattr(pretend_graphs.PretendGraph, "replay", apart(pretend_graphs.PretendGraph.replay))
         patch.setattr(trainer.Training, "advance", watched)
-        patch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # which step takes it is no chance
+        patch.setattr(
+            SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True)
+        )  # which step takes it is no chance
         patch.setattr(VisibilityBits, "use", leaving)
         config = tiny(
-            "fast", steps=160, cuda_graphs=True, target_samples=4608, open_below=0.0, start_levels=1, indirect_every=25,
-            preview_every=1.0, **settings,
-        )  # fmt: skip
+            "fast",
+            steps=160,
+            cuda_graphs=True,
+            target_samples=4608,
+            open_below=0.0,
+            start_levels=1,
+            indirect_every=25,
+            preview_every=1.0,
+            **settings,
+        )
         run.mkdir()
         with pretend_gpu(patch), launches:
             return trainer.train(load_dataset(data), config, run, device="cuda"), steps
@@ -149,13 +160,17 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     recorded it gives the same bits."""
     trained, steps = schedule_of_a_gpu(data, tmp_path / "recorded", monkeypatch, recording)
     assert trained.finished and all(p.isfinite().all() for p in trained.model.parameters())
-    at = next(i for i, step in enumerate(steps) if step.skipped)  # the first step that read of one that was not complete
+    at = next(
+        i for i, step in enumerate(steps) if step.skipped
+    )  # the first step that read of one that was not complete
     assert 57 < at <= 57 + gpu_step.READ_EVERY and [step.how for step in steps[at : at + 2]] == ["recorded", "called"]
     assert [steps[i].skipped for i in (at - 1, at, at + 1, 159)] == [0, 1, 2, 2]
     assert len({step.made_at for step in steps}) == 10 and len(steps) == 160
     replayed = [step.launches for step in steps if step.how == "replayed"]
     rays = [step.n_rays for step in steps]
-    assert not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3  # none goes to and fro
+    assert (
+        not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3
+    )  # none goes to and fro
     # A kind of steps is called, then recorded, and recorded anew where the graph has too little room.
     assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
     assert len(replayed) > 70 and max(replayed) <= 100 and statistics.median(replayed) <= 80
@@ -171,9 +186,15 @@ def test_a_capacity_changes_roundings_alone(data):
     """Losses and gradients of one step with room for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
-        "cpu", open_below=0.0, n_levels=6, target_samples=3000, initial_variance=0.4, eikonal_weight=0.0, entropy_weight=0.0,
+        "cpu",
+        open_below=0.0,
+        n_levels=6,
+        target_samples=3000,
+        initial_variance=0.4,
+        eikonal_weight=0.0,
+        entropy_weight=0.0,
         shape_priors_until=1.0,
-    )  # fmt: skip
+    )
     model = SceneModel(config)
     generator = torch.Generator().manual_seed(0)
     source = PixelSource(dataset, 0.85, generator)
@@ -239,7 +260,9 @@ def test_waiting_while_recording_is_refused():
         with pytest.raises(RuntimeError, match="waits"):
             pretend_graphs.record(lambda: waits(torch.ones(3)), None, generator)
     x, total = torch.ones(3), torch.zeros(3)
-    graph, drawn = pretend_graphs.record(lambda: total.add_(x * 2) + torch.rand(3, generator=generator), None, generator)
+    graph, drawn = pretend_graphs.record(
+        lambda: total.add_(x * 2) + torch.rand(3, generator=generator), None, generator
+    )
     assert not total.any()
     graph.replay()
     first = drawn.clone()

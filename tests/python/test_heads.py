@@ -7,7 +7,6 @@ import math
 import pytest
 import torch
 from op_checks import generator, unit
-
 from splitnerf import _core
 from splitnerf.fields import MaterialHead, NoOcclusion, OcclusionHead, OcclusionQuery, RaySegments
 from splitnerf.fields.heads import relu_mlp

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-
 from splitnerf.cli import DONE, main
 from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset

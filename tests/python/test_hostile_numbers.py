@@ -9,7 +9,6 @@ import pytest
 import torch
 import trimesh
 from gltf_builder import triangle
-
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
 from splitnerf.fields.visibility import bit_counts
@@ -92,8 +91,15 @@ def test_a_cache_without_vertices_is_refused():
     """There is none to look up."""
     none, integers = torch.zeros(0, 3), {"dtype": torch.int32}
     cache = (
-        none, none, torch.zeros(2, 5, **integers), torch.zeros(2, 0, **integers), 0.1, torch.zeros(0, 2, 2, **integers),
-        torch.zeros(0, 0, **integers), none, torch.nn.functional.normalize(torch.ones(64, 3), dim=1),
-    )  # fmt: skip
+        none,
+        none,
+        torch.zeros(2, 5, **integers),
+        torch.zeros(2, 0, **integers),
+        0.1,
+        torch.zeros(0, 2, 2, **integers),
+        torch.zeros(0, 0, **integers),
+        none,
+        torch.nn.functional.normalize(torch.ones(64, 3), dim=1),
+    )
     with pytest.raises(ValueError, match="cached_visibility: vertices must hold at least one"):
         lib.cached_visibility(ABOVE[None], -DOWN[None], *cache)

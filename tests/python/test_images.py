@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from splitnerf import _core
 from splitnerf.data import images
 from splitnerf.data.pixels import averaged_codes, decoded
@@ -64,7 +63,9 @@ def test_photos_are_averaged_to_a_step_of_16_bits(dtype, factor):
     of_object = images.area_average(linear * alpha, factor) / np.maximum(coverage, 1e-8)
     np.testing.assert_allclose(weighed[..., :3] / 65535, images.linear_to_srgb(of_object), atol=1.6e-5)
     np.testing.assert_allclose(weighed[..., 3:] / 65535, coverage, atol=1.6e-5)
-    np.testing.assert_allclose(alike[..., :3] / 65535, images.linear_to_srgb(images.area_average(linear, factor)), atol=1.6e-5)
+    np.testing.assert_allclose(
+        alike[..., :3] / 65535, images.linear_to_srgb(images.area_average(linear, factor)), atol=1.6e-5
+    )
     assert np.array_equal(weighed[..., 3], alike[..., 3]) and weighed[0, 0].tolist() == [0] * 4
     assert averaged_codes(codes, 1) is codes
 

@@ -13,24 +13,30 @@ import OpenImageIO as oiio
 import pytest
 from blender_data import ANGLE, SIZE, edit, make_blender
 from PIL import Image, ImageCms
-
 from splitnerf import notes
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import (
-    linear_to_srgb, read_codes, read_colours, read_header, read_image, read_radiance, srgb_to_linear, write_image,
-)  # fmt: skip
+    linear_to_srgb,
+    read_codes,
+    read_colours,
+    read_header,
+    read_image,
+    read_radiance,
+    srgb_to_linear,
+    write_image,
+)
 from splitnerf.data.layouts import colmap
 from splitnerf.data.layouts.frame import checked_pose, listed_file, listed_image
 from splitnerf.data.lens import lens_intrinsics, read_lens
 from splitnerf.data.masks import read_mask
 from splitnerf.data.photos import separated_mask
+from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.relight.background import read_plate
 from splitnerf_tools.capture.photographs import find_photographs, read_upright
 from splitnerf_tools.inspection.checks import inspect
-from splitnerf.data.reading import Reading
 
 DISC = np.hypot(*np.mgrid[-4:5, -4:5]) < 3.5
 
@@ -64,13 +70,15 @@ FORMS = {
     "sixteen bits, one": png(DISC * np.uint16(1)),
     "alpha": rgba(np.full_like(DISC, 255, np.uint8), 255 * DISC),
     "black with alpha": rgba(np.zeros_like(DISC, np.uint8), 255 * DISC),
-    "cut-out": png(np.dstack([np.random.default_rng(0).integers(0, 255, (*DISC.shape, 3), np.uint8), 255 * DISC.astype(np.uint8)])),
+    "cut-out": png(
+        np.dstack([np.random.default_rng(0).integers(0, 255, (*DISC.shape, 3), np.uint8), 255 * DISC.astype(np.uint8)])
+    ),
     "opaque": rgba(255 * DISC, np.full_like(DISC, 255, np.uint8)),
     "palette": palette(DISC, (0, 0, 0), (128, 0, 0)),
     "palette, dark": palette(DISC, (200, 200, 200), (10, 10, 10)),
     "colour, of two": png(np.repeat(255 * DISC[..., None].astype(np.uint8), 3, 2)),
     "bits": png(255 * DISC.astype(np.uint8)).convert("1"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -91,18 +99,23 @@ def test_a_soft_mask_stays_as_it_is(tmp_path):
         assert (read_mask(tmp_path / "mask.png") == expected).all()
 
 
-@pytest.mark.parametrize(("image", "message"), [
-    (png(np.uint8([[0, 1], [2, 1]])), "holds the labels 0, 1, 2"),
-    (png(np.uint8([[[255, 0, 0], [0, 0, 0]]])), "is coloured, which no mask is"),
-    (palette(np.uint8([[0, 1, 2]]), (0, 0, 0), (128, 0, 0), (0, 128, 0)), "holds the labels 0, 1, 2"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("image", "message"),
+    [
+        (png(np.uint8([[0, 1], [2, 1]])), "holds the labels 0, 1, 2"),
+        (png(np.uint8([[[255, 0, 0], [0, 0, 0]]])), "is coloured, which no mask is"),
+        (palette(np.uint8([[0, 1, 2]]), (0, 0, 0), (128, 0, 0), (0, 128, 0)), "holds the labels 0, 1, 2"),
+    ],
+)
 def test_a_mask_that_may_mean_several_things_is_refused(tmp_path, image, message):
     image.save(tmp_path / "mask.png")
     with pytest.raises(InputError, match=f"mask.png: {message}"):
         read_mask(tmp_path / "mask.png")
 
 
-def write_exr(path: Path, pixels: np.ndarray, names: tuple[str, ...], window: tuple[int, int, int, int] | None = None) -> None:
+def write_exr(
+    path: Path, pixels: np.ndarray, names: tuple[str, ...], window: tuple[int, int, int, int] | None = None
+) -> None:
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "float")
     spec.channelnames = names
     if window:
@@ -112,7 +125,9 @@ def write_exr(path: Path, pixels: np.ndarray, names: tuple[str, ...], window: tu
     assert sink.open(str(path), spec) and sink.write_image(pixels) and sink.close()
 
 
-@pytest.mark.parametrize("names", ["RGBAZ", "ZRGBA", "RGBZA", "BGRA", "RGB", ("depth.Z", "beauty.R", "beauty.G", "beauty.B", "beauty.A")])
+@pytest.mark.parametrize(
+    "names", ["RGBAZ", "ZRGBA", "RGBZA", "BGRA", "RGB", ("depth.Z", "beauty.R", "beauty.G", "beauty.B", "beauty.A")]
+)
 def test_channels_are_found_by_their_names(tmp_path, capsys, names):
     value = {"R": 0.1, "G": 0.2, "B": 0.3, "A": 0.5, "Z": 9.0}
     plain = [name[-1] for name in names]
@@ -146,12 +161,16 @@ def wide_profile() -> bytes:
         if tag in columns:
             srgb[offset + 8 : offset + 20] = struct.pack(">3i", *(round(65536 * x) for x in columns[tag]))
         if tag == b"desc":
-            srgb[offset : offset + size] = srgb[offset : offset + size].replace("sRGB".encode("utf-16-be"), "wide".encode("utf-16-be"))
+            srgb[offset : offset + size] = srgb[offset : offset + size].replace(
+                "sRGB".encode("utf-16-be"), "wide".encode("utf-16-be")
+            )
     return bytes(srgb)
 
 
 # From linear Display P3 to linear sRGB (CSS Color 4, section 10).
-FROM_P3 = np.array([[1.2249401762, -0.2249401762, 0], [-0.0420569547, 1.0420569547, 0], [-0.0196375546, -0.0786360456, 1.0982736]])
+FROM_P3 = np.array(
+    [[1.2249401762, -0.2249401762, 0], [-0.0420569547, 1.0420569547, 0], [-0.0196375546, -0.0786360456, 1.0982736]]
+)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
@@ -164,7 +183,9 @@ def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix):
     assert read_codes(tmp_path / f"x{suffix}")[3, 3] == pytest.approx([180, 130, 90], abs=2)  # a map of numbers
     (photo_of,) = find_photographs(tmp_path)
     assert read_upright(photo_of.path)[3, 3] == pytest.approx(expected, abs=2)
-    assert read_plate(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(srgb_to_linear(np.float32(expected) / 255), rel=0.06)
+    assert read_plate(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(
+        srgb_to_linear(np.float32(expected) / 255), rel=0.06
+    )
 
 
 def test_profiles_that_are_srgb_or_cannot_be_used_change_nothing(tmp_path, capsys):
@@ -173,7 +194,9 @@ def test_profiles_that_are_srgb_or_cannot_be_used_change_nothing(tmp_path, capsy
     Image.fromarray(photo).save(tmp_path / "srgb.png", icc_profile=srgb)
     assert np.array_equal(read_colours(tmp_path / "srgb.png"), photo) and capsys.readouterr().err == ""
     spec, words = oiio.ImageSpec(4, 4, 3, "uint16"), np.uint16(photo) * 257
-    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(wide_profile())}]"), np.frombuffer(wide_profile(), np.uint8))
+    spec.attribute(
+        "ICCProfile", oiio.TypeDesc(f"uint8[{len(wide_profile())}]"), np.frombuffer(wide_profile(), np.uint8)
+    )
     sink = oiio.ImageOutput.create("x.png")
     assert sink.open(str(tmp_path / "words.png"), spec) and sink.write_image(words) and sink.close()
     assert np.array_equal(read_colours(tmp_path / "words.png"), words)
@@ -185,12 +208,21 @@ def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
     buffer = io.BytesIO()
     image.save(buffer, "png")
     whole = buffer.getvalue()
-    return whole[:33] + struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) + whole[33:]
+    return (
+        whole[:33]
+        + struct.pack(">I", len(data))
+        + kind
+        + data
+        + struct.pack(">I", zlib.crc32(kind + data))
+        + whole[33:]
+    )
 
 
 @pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
 def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
-    (tmp_path / "x.png").write_bytes(with_chunk(png(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma))))
+    (tmp_path / "x.png").write_bytes(
+        with_chunk(png(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
+    )
     expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
     assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
     assert ("state the gamma" in capsys.readouterr().err) == (exponent is not None)
@@ -226,13 +258,16 @@ def test_the_content_of_a_plate_decides_its_curve(tmp_path):
     assert read_plate(tmp_path / "x.exr") == pytest.approx(srgb_to_linear(np.float32([128 / 255]))[0], abs=1e-3)
 
 
-@pytest.mark.parametrize(("lens", "expected"), [
-    ({"camera_angle_x": 1.0, "camera_angle_y": 0.5}, (100 / np.tan(0.5), 75 / np.tan(0.25), 100, 75)),
-    ({"camera_angle_y": 0.5}, (75 / np.tan(0.25), 75 / np.tan(0.25), 100, 75)),
-    ({"fl_x": 150, "camera_angle_y": 0.5}, (150, 75 / np.tan(0.25), 100, 75)),
-    ({"fl_y": 120}, (120, 120, 100, 75)),
-    ({"fl_x": 300, "cx": -20, "cy": 500, "w": 400, "h": 300}, (150, 150, -10, 250)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("lens", "expected"),
+    [
+        ({"camera_angle_x": 1.0, "camera_angle_y": 0.5}, (100 / np.tan(0.5), 75 / np.tan(0.25), 100, 75)),
+        ({"camera_angle_y": 0.5}, (75 / np.tan(0.25), 75 / np.tan(0.25), 100, 75)),
+        ({"fl_x": 150, "camera_angle_y": 0.5}, (150, 75 / np.tan(0.25), 100, 75)),
+        ({"fl_y": 120}, (120, 120, 100, 75)),
+        ({"fl_x": 300, "cx": -20, "cy": 500, "w": 400, "h": 300}, (150, 150, -10, 250)),
+    ],
+)
 def test_each_number_of_a_lens_is_read(lens, expected):
     assert lens_intrinsics(read_lens(lens, "x")[0], (150, 200)) == pytest.approx(expected)
 
@@ -285,7 +320,14 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
 
 
 def test_found_masks_have_names_of_their_own():
-    images = ["cam0/images/0.jpg", "cam1/images/0.jpg", "cam1/images/0.png", "cam1/0.jpg", "../cam1/0.jpg", "cam1_images/0.jpg"]
+    images = [
+        "cam0/images/0.jpg",
+        "cam1/images/0.jpg",
+        "cam1/images/0.png",
+        "cam1/0.jpg",
+        "../cam1/0.jpg",
+        "cam1_images/0.jpg",
+    ]
     names = [separated_mask(Path("data") / image, Path("data")) for image in images]
     assert len(set(names)) == len(images) and all(name.suffix == ".png" and ".." not in name.parts for name in names)
 
@@ -296,7 +338,9 @@ def test_the_model_of_most_images_is_read_whatever_its_bytes(tmp_path):
         folder.mkdir(parents=True)
         (folder / "cameras.txt").write_text("1 PINHOLE 48.0 48 60 60 24 24\n")
         points = " ".join(["1.0 2.0 7"] * n_points)
-        (folder / "images.txt").write_text("".join(f"{i} 1 0 0 0 0 0 {i} 1 r_{i}.png\n{points}\n" for i in range(n_images)))
+        (folder / "images.txt").write_text(
+            "".join(f"{i} 1 0 0 0 0 0 {i} 1 r_{i}.png\n{points}\n" for i in range(n_images))
+        )
     (tmp_path / "images").mkdir()
     for i in range(4):
         write_image(tmp_path / f"images/r_{i}.png", np.ones((48, 48, 4), np.float32))
@@ -313,16 +357,27 @@ def test_data_of_close_ups_have_a_page(tmp_path, capsys):
     for split in ("train", "test"):
         for path in (data / split).glob("*.png"):
             write_image(path, read_image(path)[10:38, 10:38])
-        edit(data, lambda meta: meta.update(camera_angle_x=2 * np.arctan(np.tan(ANGLE / 2) * 28 / SIZE)), f"transforms_{split}.json")
+        edit(
+            data,
+            lambda meta: meta.update(camera_angle_x=2 * np.arctan(np.tan(ANGLE / 2) * 28 / SIZE)),
+            f"transforms_{split}.json",
+        )
     assert main(["inspect", str(data), "--out", str(tmp_path / "page.html")]) == DONE
     assert "cut" in capsys.readouterr().out and (tmp_path / "page.html").stat().st_size > 1000
 
 
 def test_a_world_that_hangs_is_said(tmp_path):
     data = make_blender(tmp_path, train=8)
-    assert not {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"].advice
+    assert not {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}[
+        "upward by the cameras"
+    ].advice
     turn = np.diag([1.0, -1, -1, 1])
     for frame in range(8):
-        edit(data, lambda meta: meta["frames"][frame].update(transform_matrix=(turn @ meta["frames"][frame]["transform_matrix"]).tolist()))
+        edit(
+            data,
+            lambda meta: meta["frames"][frame].update(
+                transform_matrix=(turn @ meta["frames"][frame]["transform_matrix"]).tolist()
+            ),
+        )
     finding = {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"]
     assert finding.value == "(0.00, 0.00, -1.00)" and "turn the data's world" in finding.advice

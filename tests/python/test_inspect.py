@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from blender_data import ANGLE, look_at, poses_around, sphere_alpha
 from scipy.spatial.transform import Rotation
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.reading import Reading
-from splitnerf_tools.inspection.directions import find_upward, largest_gap
 from splitnerf_tools.inspection.checks import Inspection, inspect
+from splitnerf_tools.inspection.directions import find_upward, largest_gap
 from splitnerf_tools.inspection.reduced_views import views_of
 
 SIZE, COUNT, ALL = 100, 24, Reading("all")
@@ -29,7 +28,9 @@ class Photos:
     def __init__(self, poses: list[np.ndarray] | None = None, offsets: dict[int, np.ndarray] | None = None):
         self.poses = poses_around(np.zeros(3), 1.0, COUNT) if poses is None else poses
         self.alphas = [
-            np.max([sphere_alpha(pose, np.add(centre, (offsets or {}).get(i, 0)), r, SIZE) for centre, r in BALLS], axis=0)
+            np.max(
+                [sphere_alpha(pose, np.add(centre, (offsets or {}).get(i, 0)), r, SIZE) for centre, r in BALLS], axis=0
+            )
             for i, pose in enumerate(self.poses)
         ]
         self.linear = [np.full((SIZE, SIZE, 3), LINEAR, np.float32) for _ in self.poses]
@@ -187,7 +188,9 @@ def test_held_out_photos_are_looked_at_too(tmp_path, capsys):
     assert "08.png" in printed and "held out · <b>brightness +1" in (tmp_path / "page.html").read_text()
 
 
-@pytest.mark.parametrize("data, out, said", [("absent", "page.html", "no such folder"), ("data", "page.txt", "not a page")])
+@pytest.mark.parametrize(
+    "data, out, said", [("absent", "page.html", "no such folder"), ("data", "page.txt", "not a page")]
+)
 def test_bad_input_is_refused(tmp_path, capsys, data, out, said):
     Photos().write(tmp_path / "data")
     assert main(["inspect", str(tmp_path / data), "--out", str(tmp_path / out)]) == BAD_INPUT

@@ -22,7 +22,9 @@ def test_no_kernel_of_a_step_spills():
 
 def test_two_blocks_of_the_field_share_a_processor():
     """As the number of blocks that its kernels start says: 2 x 256 threads and 65,536 registers."""
-    fields = [kernel for kernel in kernel_resources.committed()[1] if kernel.bare in ("field_kernel", "field_backward_kernel")]
+    fields = [
+        kernel for kernel in kernel_resources.committed()[1] if kernel.bare in ("field_kernel", "field_backward_kernel")
+    ]
     assert len(fields) == 6 and all(kernel.numbers[0] <= 128 for kernel in fields)
 
 

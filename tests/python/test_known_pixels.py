@@ -9,7 +9,6 @@ import pytest
 from blender_data import SIZE, edit, look_at, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, LENS, RADIUS, sphere_poses, write_transforms
 from op_checks import generator
-
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.data.normalisation import MasksContradict, estimate_box, nearest_to_rays

@@ -97,9 +97,17 @@ def result(tmp_path_factory) -> Result:
         frames.append({"file_path": f"./r_{i}", "transform_matrix": pose.tolist()})
     (root / "transforms_train.json").write_text(json.dumps({"camera_angle_x": ANGLE, "frames": frames}))
     config = tiny(
-        steps=360, warmup_steps=20, target_samples=2048, max_rays=256, log2_table_size=12, export_resolution=48, export_faces=1500,
-        export_texture_size=128, preview_every=2.0, mesh_every=0.5,
-    )  # fmt: skip
+        steps=360,
+        warmup_steps=20,
+        target_samples=2048,
+        max_rays=256,
+        log2_table_size=12,
+        export_resolution=48,
+        export_faces=1500,
+        export_texture_size=128,
+        preview_every=2.0,
+        mesh_every=0.5,
+    )
     dataset = load_dataset(root)
     trained = train(dataset, config, root)
     write_assets(root, trained.model, dataset.box_from_world, Cameras.of(dataset))

@@ -9,7 +9,6 @@ import pytest
 import torch
 import trimesh
 from painted_ball import photos, textured, with_textures
-
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
@@ -141,8 +140,11 @@ def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate,
 
 def test_metal_and_a_light_without_a_lamp_say_nothing(ball_over_plate):
     light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
-    metal = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light),
-                          roughness_metallic_texture=np.ones((SIZE, SIZE, 2), np.float32))  # fmt: skip
+    metal = with_textures(
+        ball_over_plate,
+        albedo_texture=shaded_albedo(ball_over_plate, 0.3, light),
+        roughness_metallic_texture=np.ones((SIZE, SIZE, 2), np.float32),
+    )
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
     assert compact_lamp(AssetTexels(ball_over_plate), flat, 3, 0) == (flat, None)
 

@@ -9,17 +9,22 @@ from types import SimpleNamespace
 import pytest
 import torch
 import trimesh
-from tiny_runs import tiny
-from torch.nn import functional as F
-
 from splitnerf.config import Config
 from splitnerf.ops import MeshScene
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays, find_samples, render_rays
 from splitnerf.training import late_occlusion, losses
 from splitnerf.training.late_occlusion import LateOcclusion, one_of_each_run
+from tiny_runs import tiny
+from torch.nn import functional as F
 
-ALL = {"occlusion_share": 1.0, "occlusion_rays": 8, "constants.occlusion_environment_height": 8, "sphere_radius": 0.6, "min_step": 0.05}
+ALL = {
+    "occlusion_share": 1.0,
+    "occlusion_rays": 8,
+    "constants.occlusion_environment_height": 8,
+    "sphere_radius": 0.6,
+    "min_step": 0.05,
+}
 
 
 def generator() -> torch.Generator:
@@ -72,11 +77,8 @@ def hand(monkeypatch) -> list[tuple[Future, tuple]]:
 
 @pytest.mark.parametrize(
     "settings",
-    [
-        {}, {"occlusion_directional": True, "occlusion_channels": 3},
-        {"normals": "analytic", "materials.inputs": "grid"},
-    ],
-)  # fmt: skip
+    [{}, {"occlusion_directional": True, "occlusion_channels": 3}, {"normals": "analytic", "materials.inputs": "grid"}],
+)
 def test_of_a_model_that_stands_still_it_is_the_loss_of_the_step(hand, settings):
     """All samples are taken: value and slopes of both, the rays by the same seed."""
     scene = Scene(**settings)
@@ -146,9 +148,10 @@ def test_a_thread_traces_and_what_goes_wrong_there_is_told(monkeypatch):
     late, ray = LateOcclusion(scene.model, generator()), scene.rendered()
     done, may_go, trace = [], threading.Event(), late_occlusion.traced_factors
     monkeypatch.setattr(
-        late_occlusion, "traced_factors",
+        late_occlusion,
+        "traced_factors",
         lambda *args: may_go.wait(20) and done.append(threading.current_thread()) or trace(*args),
-    )  # fmt: skip
+    )
     assert late.loss(ray, scene.mesh, scene.environment, 0) is None and not done
     may_go.set()
     late.close()

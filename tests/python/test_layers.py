@@ -51,7 +51,9 @@ def unit(module: str) -> str:
 
 def wrong_way(imports: Imports) -> list[str]:
     """The imports that run up the layers, or from the core to the tools."""
-    level = {f"{package}.{name}": i for package, lines in LAYERS.items() for i, line in enumerate(lines) for name in line}
+    level = {
+        f"{package}.{name}": i for package, lines in LAYERS.items() for i, line in enumerate(lines) for name in line
+    }
 
     def allowed(module: str, imported: str) -> bool:
         here, there = (name.partition(".")[0] for name in (module, imported))
@@ -77,7 +79,9 @@ def circle(imports: Imports) -> list[str]:
 @pytest.mark.parametrize("package", LAYERS)
 def test_every_unit_has_a_layer(imports, package):
     units = {unit(module) for module in imports if module.startswith(f"{package}.")}
-    assert units | {"splitnerf._core"} == {f"{package}.{name}" for name in set().union(*LAYERS[package])} | {"splitnerf._core"}
+    assert units | {"splitnerf._core"} == {f"{package}.{name}" for name in set().union(*LAYERS[package])} | {
+        "splitnerf._core"
+    }
 
 
 def test_imports_run_down_the_layers_and_none_of_the_core_is_of_a_tool(imports):

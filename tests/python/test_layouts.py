@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 from blender_data import SIZE, edit, make_blender, sphere_alpha
 from layout_scenes import (
-    CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, world_to_camera, write_colmap, write_neus,
+    CENTRE,
+    COUNT,
+    FOCAL,
+    LENS,
+    RADIUS,
+    sphere_poses,
+    world_to_camera,
+    write_colmap,
+    write_neus,
     write_transforms,
-)  # fmt: skip
-
+)
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import write_image
@@ -90,13 +97,16 @@ def test_images_in_folders_have_their_masks_in_folders(tmp_path, binary):
     assert frame.distortion.radial == (0.05, 0.01, 0, 0) and not frame.distortion.fisheye
 
 
-@pytest.mark.parametrize(("number", "name", "parameters", "expected"), [
-    (2, "SIMPLE_RADIAL", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), False)),
-    (4, "OPENCV", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0, 0), (0.3, 0.4), False)),
-    (5, "OPENCV_FISHEYE", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0.3, 0.4), (0, 0), True)),
-    (8, "SIMPLE_RADIAL_FISHEYE", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), True)),
-    (9, "RADIAL_FISHEYE", [9.0, 4, 3, 0.1, 0.2], ((9, 9, 4, 3), (0.1, 0.2, 0, 0), (0, 0), True)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("number", "name", "parameters", "expected"),
+    [
+        (2, "SIMPLE_RADIAL", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), False)),
+        (4, "OPENCV", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0, 0), (0.3, 0.4), False)),
+        (5, "OPENCV_FISHEYE", [9.0, 8, 4, 3, 0.1, 0.2, 0.3, 0.4], ((9, 8, 4, 3), (0.1, 0.2, 0.3, 0.4), (0, 0), True)),
+        (8, "SIMPLE_RADIAL_FISHEYE", [9.0, 4, 3, 0.1], ((9, 9, 4, 3), (0.1, 0, 0, 0), (0, 0), True)),
+        (9, "RADIAL_FISHEYE", [9.0, 4, 3, 0.1, 0.2], ((9, 9, 4, 3), (0.1, 0.2, 0, 0), (0, 0), True)),
+    ],
+)
 @pytest.mark.parametrize("binary", [True, False])
 def test_each_camera_model_of_colmap(tmp_path, binary, number, name, parameters, expected):
     frames, _ = read_frames(
@@ -158,12 +168,21 @@ def test_eval_modes_of_data_that_make_splits(tmp_path):
     assert names(root, "all")[0] == [*train, "r_0", "r_2"]
 
 
-@pytest.mark.parametrize(("path", "split"), [
-    ("images/test_001.png", "test"), ("images/train_001.png", "train"), ("test/latest.png", "test"),
-    ("Train/contest.png", "train"),
-    ("train/eval_3.png", "test"), ("test/train/0.png", "train"), ("testing/7.png", "test"),
-    ("latest/contest.png", None), ("train_test/0.png", None), ("test_train/test_0.png", "test"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("path", "split"),
+    [
+        ("images/test_001.png", "test"),
+        ("images/train_001.png", "train"),
+        ("test/latest.png", "test"),
+        ("Train/contest.png", "train"),
+        ("train/eval_3.png", "test"),
+        ("test/train/0.png", "train"),
+        ("testing/7.png", "test"),
+        ("latest/contest.png", None),
+        ("train_test/0.png", None),
+        ("test_train/test_0.png", "test"),
+    ],
+)
 def test_words_in_paths(tmp_path, path, split):
     root = write_transforms(tmp_path / "train")  # the folder's own name does not count
     write_image(root / path, np.ones((SIZE, SIZE, 4)))
@@ -206,8 +225,10 @@ def test_files_outside_of_the_folder_are_read_and_named_once(tmp_path, capsys):
         edit(root, lambda m, i=i, f=folder: m["frames"][i].update(file_path=f"{f}/images/v{i:02d}"), "transforms.json")
     assert len(load_dataset(root)) == COUNT - 2
     notes = [line for line in capsys.readouterr().err.splitlines() if "outside of" in line]
-    assert notes == [f"splitnerf: note: {root}/transforms.json: names files outside of its folder; they are read "
-                     "('../images/v00.png' is one)"]  # fmt: skip
+    assert notes == [
+        f"splitnerf: note: {root}/transforms.json: names files outside of its folder; they are read "
+        "('../images/v00.png' is one)"
+    ]
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "/etc/passwd", "../secret"])

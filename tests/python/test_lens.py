@@ -9,11 +9,10 @@ import pytest
 import torch
 from blender_data import SIZE, edit, sphere_alpha
 from layout_scenes import CENTRE, COUNT, LENS, RADIUS, opencv_points, seen_by_pixels, write_transforms
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import read_frames
 from splitnerf.data.images import write_image
-from splitnerf.data.lens import Distortion, sample_cubic, read_lens, undistort
+from splitnerf.data.lens import Distortion, read_lens, sample_cubic, undistort
 
 HEIGHT, WIDTH, CAMERA = 90, 130, (120.0, 118.0, 63.0, 47.0)
 FOX = {"k1": 0.0578, "k2": -0.0805, "p1": -0.00098, "p2": 0.00016}  # about those of instant-ngp's photos of a fox
@@ -114,12 +113,16 @@ def sphere_seen(pose: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 STRONG = {"k1": 0.9, "p1": 0.01}
 
 
-@pytest.mark.parametrize(("k", "keys"), [
-    (STRONG, STRONG | {"camera_model": "OPENCV"}), (STRONG, STRONG),
-    ({"k1": 0.9}, {"k1": 0.9, "k2": 0, "camera_model": "RADIAL"}),
-    ({"k1": 0.4, "fisheye": True}, {"k1": 0.4, "camera_model": "OPENCV_FISHEYE"}),
-    ({"k1": 0.4, "fisheye": True}, {"k1": 0.4, "is_fisheye": True}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("k", "keys"),
+    [
+        (STRONG, STRONG | {"camera_model": "OPENCV"}),
+        (STRONG, STRONG),
+        ({"k1": 0.9}, {"k1": 0.9, "k2": 0, "camera_model": "RADIAL"}),
+        ({"k1": 0.4, "fisheye": True}, {"k1": 0.4, "camera_model": "OPENCV_FISHEYE"}),
+        ({"k1": 0.4, "fisheye": True}, {"k1": 0.4, "is_fisheye": True}),
+    ],
+)
 def test_photos_and_masks_of_a_transforms_file_are_undistorted(tmp_path, k, keys):
     data = load_dataset(bent_scene(tmp_path, k, **keys))
     assert data.intrinsics[0] == pytest.approx(LENS)

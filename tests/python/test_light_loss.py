@@ -7,11 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from test_physics import rays
-from tiny_runs import tiny
-
 from splitnerf.fields.light import LightSamples
 from splitnerf.training import losses
+from test_physics import rays
+from tiny_runs import tiny
 
 LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "constants.light_form": "square"}
 
@@ -135,7 +134,11 @@ def test_the_gradient_is_that_of_the_weighted_sum():
     terms.add({"c": -3.0}, torch.tensor(1.0))
     terms.backward()
     assert x.grad.item() == pytest.approx(17.0)
-    assert {name: (weight, value.item()) for name, (weight, value) in terms.items()} == {"a": (2, 9), "b": (5, 3), "c": (-3, 1)}
+    assert {name: (weight, value.item()) for name, (weight, value) in terms.items()} == {
+        "a": (2, 9),
+        "b": (5, 3),
+        "c": (-3, 1),
+    }
 
 
 def test_shares_that_are_not_finite_do_not_stop_the_draw_of_materials():
@@ -169,13 +172,19 @@ def occlusion_rays(n: int) -> SimpleNamespace:
     number = torch.arange(float(n))
     column = number[:, None]
     points = SimpleNamespace(
-        lobe_dirs=column + torch.tensor([0.0, 0.0, 0.5]), roughness=column, occlusion_d=0.5 + 0.002 * column,
+        lobe_dirs=column + torch.tensor([0.0, 0.0, 0.5]),
+        roughness=column,
+        occlusion_d=0.5 + 0.002 * column,
         occlusion_s=0.5 - 0.004 * column,
-    )  # fmt: skip
+    )
     return SimpleNamespace(
-        shaded=torch.arange(n), shares=1.0 + number, positions=column.expand(-1, 3), sdf=torch.zeros(n),
-        normals=column + torch.tensor([0.0, 0.5, 0.0]), points=points,
-    )  # fmt: skip
+        shaded=torch.arange(n),
+        shares=1.0 + number,
+        positions=column.expand(-1, 3),
+        sdf=torch.zeros(n),
+        normals=column + torch.tensor([0.0, 0.5, 0.0]),
+        points=points,
+    )
 
 
 def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):

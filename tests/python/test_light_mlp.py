@@ -5,14 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import generator, unit
+from splitnerf.fields import LightMlp
 from torch import Tensor
 
-from splitnerf.fields import LightMlp
-
-ACTIVATIONS = {
-    "softplus": lambda x: torch.logaddexp(x, torch.zeros(())),
-    "exp": lambda x: x.clamp(-12, 12).exp(),
-}
+ACTIVATIONS = {"softplus": lambda x: torch.logaddexp(x, torch.zeros(())), "exp": lambda x: x.clamp(-12, 12).exp()}
 W, RHO = unit(torch.randn(50, 3, generator=generator(1))), torch.rand(50, 1, generator=generator(2))
 
 

@@ -9,13 +9,10 @@ import torch
 from op_cases import octahedral_directions
 from op_checks import generator, unit
 from precision import precisions
-
-from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, VisibilityBits
+from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, VisibilityBits, light_pyramid
 from splitnerf.fields.light import LightSamples, lobe_roughness, panorama_directions
-from splitnerf.fields import light_pyramid
 from splitnerf.fields.light_pyramid import chain_resolution, is_resolved, pyramid_filters
 from splitnerf.ops import sh_projection
-
 
 # ---- the number of directions ----
 
@@ -190,10 +187,14 @@ def test_a_lobe_as_wide_as_the_sphere_is_rough():
 # ---- the pyramid's maps ----
 
 
-@pytest.mark.parametrize(("resolution", "maps", "nodes"), [
-    (16, [16, 16, 16], [0.05, 0.3, 0.4, 0.5]), (32, [32, 32, 32], [0.05, 0.3, 0.4, 0.5]),
-    (64, [64, 64, 64, 64, 32], [0.05, 0.15, 0.2, 0.3, 0.4, 0.5]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("resolution", "maps", "nodes"),
+    [
+        (16, [16, 16, 16], [0.05, 0.3, 0.4, 0.5]),
+        (32, [32, 32, 32], [0.05, 0.3, 0.4, 0.5]),
+        (64, [64, 64, 64, 64, 32], [0.05, 0.15, 0.2, 0.3, 0.4, 0.5]),
+    ],
+)
 def test_maps_are_as_fine_as_their_lobes(resolution, maps, nodes):
     """5 texels for ggx_alpha = rho^2, where the lobe, 2.57 alpha wide, is wider than a texel, and what is wide is wider
     than one of its own map."""

@@ -12,12 +12,13 @@ import pytest
 import torch
 from op_cases import octahedral_directions
 from op_checks import generator, unit
-
 from splitnerf.data.environment import read_environment, sample_environment
 from splitnerf.fields import LightPyramid
 from splitnerf.ops import sample_ggx_lobe
 
 DATA = Path(os.environ.get("SPLITNERF_DATA", Path(__file__).parents[3] / "shared" / "data"))
+
+
 def pyramid_of(radiance: torch.Tensor) -> LightPyramid:
     """The pyramid whose texels have this radiance, [n^2, 3]."""
     light = LightPyramid(math.isqrt(len(radiance)))

@@ -11,7 +11,6 @@ import trimesh
 from bench import hard_scenes, limits
 from bench.swap import PARTS, Canvas, NearestPoints, surface_values
 from bench.tubes import assemble
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
@@ -49,19 +48,24 @@ def spoiled(asset: Asset) -> Asset:
 def files(tmp_path_factory):
     """A data set of two balls, and a run's folder with a spoiled asset."""
     folder = tmp_path_factory.mktemp("limits")
-    scene = trimesh.Scene({
-        "large": ball((0.6, 0.2, 0.1), 0.0, 0.3, 0.6, (0, 0, 0)),
-        "small": ball((0.8, 0.8, 0.4), 1.0, 0.2, 0.3, (0.9, 0, 0)),
-    })  # fmt: skip
+    scene = trimesh.Scene(
+        {
+            "large": ball((0.6, 0.2, 0.1), 0.0, 0.3, 0.6, (0, 0, 0)),
+            "small": ball((0.8, 0.8, 0.4), 1.0, 0.2, 0.3, (0.9, 0, 0)),
+        }
+    )
     (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
     light = np.full((16, 32, 3), 0.3, np.float32)
     light[4:8, 10:14] = 8
     write_image(folder / "light.exr", light)
     write_image(folder / "turned.exr", np.roll(light, 11, axis=1))
     data = synthesise(
-        folder / "balls.glb", folder / "light.exr", [folder / "turned.exr"], folder / "data",
+        folder / "balls.glb",
+        folder / "light.exr",
+        [folder / "turned.exr"],
+        folder / "data",
         SynthSettings(size=32, train=2, test=2, spp=64),
-    )  # fmt: skip
+    )
     (folder / "run").mkdir()
     write_glb(folder / "run" / "mesh.glb", spoiled(read_asset(data / "asset.glb")))
     write_image(folder / "run" / "environment.exr", 0.5 * light)
@@ -90,10 +94,12 @@ def test_the_table_has_the_ceiling_and_mends_one_part_at_a_time(files, tmp_path,
     for name, path in (("ours", run / "mesh.glb"), ("all true", data / "asset.glb")):
         scores = evaluate_asset(path, data, protocol).scores
         for key, value in (
-            ("relit", scores["relight"]["psnr"]), ("relit_raw", scores["relight"]["raw"]["psnr"]),
-            ("albedo", scores["albedo"]["psnr"]), ("roughness", scores["roughness_mae"]),
+            ("relit", scores["relight"]["psnr"]),
+            ("relit_raw", scores["relight"]["raw"]["psnr"]),
+            ("albedo", scores["albedo"]["psnr"]),
+            ("roughness", scores["roughness_mae"]),
             ("smooth", scores["normal_mae_deg"]),
-        ):  # fmt: skip
+        ):
             assert rows[name][key] == pytest.approx(value, abs=6e-3), (name, key)
 
     ours, ceiling = rows["ours"], rows["all true"]
@@ -131,8 +137,13 @@ def test_true_albedo_is_found_on_every_texel(files):
 def test_nearest_points_are_on_the_sheet_that_faces_the_same_way():
     thickness = 0.01
     box = trimesh.creation.box(extents=(2, 2, thickness))
-    plate = Asset("plate", box.vertices.astype(np.float32), box.faces.astype(np.int32),
-                  np.array(box.vertex_normals, np.float32), np.zeros(12, np.int32))  # fmt: skip
+    plate = Asset(
+        "plate",
+        box.vertices.astype(np.float32),
+        box.faces.astype(np.int32),
+        np.array(box.vertex_normals, np.float32),
+        np.zeros(12, np.int32),
+    )
     draw = np.random.default_rng(0)
     points = draw.uniform(-0.9, 0.9, (200, 3)) * [1, 1, 0] + [0, 0, 0.004]
     for side in (1.0, -1.0):

@@ -14,15 +14,11 @@ import numpy as np
 import pytest
 import torch
 from looking_at import serving
-from test_train import flat, same
-from tiny_runs import tiny
-from viewer_server import ask, error_of, halves, triangle
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
-from splitnerf.export.surface import surface_materials
 from splitnerf.export.scene import surface_of
+from splitnerf.export.surface import surface_materials
 from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import NOBODY, Event, Request
@@ -33,6 +29,9 @@ from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import ViewServer
 from splitnerf_tools.view.training_asset import training_asset, training_glb
 from splitnerf_tools.view.training_page import training_page
+from test_train import flat, same
+from tiny_runs import tiny
+from viewer_server import ask, error_of, halves, triangle
 
 CPU = torch.device("cpu")
 
@@ -74,7 +73,9 @@ def stepped(data, tmp_path, eager):
 def page_of(server):
     """What an open page hears: a function that returns the next state."""
     with socket.create_connection(server.server_address, timeout=20) as page, page.makefile("rb") as stream:
-        page.sendall(f"GET {urlsplit(server.url).path}events HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\n\r\n".encode())
+        page.sendall(
+            f"GET {urlsplit(server.url).path}events HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\n\r\n".encode()
+        )
 
         def heard(wanted=lambda state: True):
             while True:
@@ -104,7 +105,10 @@ def test_a_training_asset_has_the_materials_of_the_fields(tmp_path):
     assert np.ptp(roughness) > 0.2 and np.ptp(metallic) > 0.2 and np.ptp(albedo) > 0.2
     assert asset.colors == pytest.approx(albedo, abs=1e-3)
     assert (asset.normals * normals).sum(axis=1) == pytest.approx(1, abs=1e-3)
-    texture = asset.materials[0].roughness_metallic_texture * [asset.materials[0].roughness, asset.materials[0].metallic]
+    texture = asset.materials[0].roughness_metallic_texture * [
+        asset.materials[0].roughness,
+        asset.materials[0].metallic,
+    ]
     size = texture.shape[0]
     across, down = (asset.uv * size - 0.5).T
     left, top = np.int64(np.clip(np.floor([across, down]), 0, size - 2))
@@ -122,8 +126,7 @@ def test_nothing_is_made_while_no_page_is_open(stepped):
 
 
 def test_an_open_page_gets_surface_light_and_numbers(stepped):
-    assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [
-        {"name": "mine", "light": 1, "version": 0}]  # fmt: skip
+    assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [{"name": "mine", "light": 1, "version": 0}]
     with page_of(stepped.server) as heard:
         state = heard()
         assert state["stage"] == "training" and state["version"] == 0 and not state["paused"]
@@ -193,7 +196,9 @@ def test_buttons_are_for_the_page_alone(stepped):
 
 def test_the_delivered_asset_is_shown(stepped, tmp_path):
     """Each time in the place of the one before, with its light; what is read, is read when a page asks."""
-    for version, (stage, folder) in enumerate((("refinement", tmp_path / "trained"), ("evaluation", tmp_path / "final")), start=1):
+    for version, (stage, folder) in enumerate(
+        (("refinement", tmp_path / "trained"), ("evaluation", tmp_path / "final")), start=1
+    ):
         folder.mkdir()
         content = triangle().write(folder / "mesh.glb").read_bytes()
         write_image(folder / "environment.exr", np.full((4, 8, 3), version, np.float32))
@@ -308,5 +313,7 @@ def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path,
 
     monkeypatch.setattr(stepped.live.shown, "source_of", read)
     status, _, content = ask(stepped.server, "scene.json")
-    assert status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
+    assert (
+        status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
+    )
     assert stepped.live.events.state["version"] == 0  # pages wait for no newer one

@@ -7,7 +7,6 @@ import dataclasses
 import pytest
 import torch
 from op_checks import generator, unit
-
 from splitnerf.config import preset
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import make_grid
@@ -16,9 +15,16 @@ from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_c
 from splitnerf.training.losses import loss_terms
 
 SMALL = {
-    "n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "constants.materials_width": 16, "occlusion_width": 16, "light_width": 16,
-    "light_samples": 64, "light_queries": 32, "min_step": 0.02,
-}  # fmt: skip
+    "n_levels": 4,
+    "log2_table_size": 10,
+    "grid_resolution": 16,
+    "constants.materials_width": 16,
+    "occlusion_width": 16,
+    "light_width": 16,
+    "light_samples": 64,
+    "light_queries": 32,
+    "min_step": 0.02,
+}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +42,9 @@ def rendered():
     background, jitter = torch.rand(n, 3, generator=g), torch.rand(n, generator=g)
     photo = torch.zeros(n, dtype=torch.int64), torch.ones(n, 3)
     probes = make_probes(config, *draw_numbers(g, probe_counts(config)))
-    batch = Batch(origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, jitter, *photo, probes)
+    batch = Batch(
+        origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, jitter, *photo, probes
+    )
     light = model.evaluate_light()
     ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)
@@ -63,7 +71,9 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
     found = loss_terms(model, model.evaluate_light(), batch, linear, None, None, generator(2), 0, 0.0)
     predicted = batch.background + ray.opacity[:, None] * (linear.colour - batch.background)
     truth = batch.background + batch.target[:, 3:] * (batch.target[:, :3] - batch.background)
-    assert weighted(found, "colour") == pytest.approx(10.0 * (predicted - truth).square().sum(1).mean().item(), rel=1e-5)
+    assert weighted(found, "colour") == pytest.approx(
+        10.0 * (predicted - truth).square().sum(1).mean().item(), rel=1e-5
+    )
     assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
@@ -71,8 +81,14 @@ def test_colours_are_compared_at_the_exposures_of_their_photos(rendered):
     """Half of the exposure and twice the light are the same."""
     config, batch, ray, _ = rendered
     model, linear = SceneModel(config), dataclasses.replace(ray, linear=True)
-    same = batch._replace(exposure=0.5 * torch.ones_like(batch.exposure)), dataclasses.replace(linear, mean=2 * ray.mean)
-    terms = [loss_terms(model, model.evaluate_light(), *case, None, None, generator(2), 0, 0.0) for case in ((batch, linear), same)]
+    same = (
+        batch._replace(exposure=0.5 * torch.ones_like(batch.exposure)),
+        dataclasses.replace(linear, mean=2 * ray.mean),
+    )
+    terms = [
+        loss_terms(model, model.evaluate_light(), *case, None, None, generator(2), 0, 0.0)
+        for case in ((batch, linear), same)
+    ]
     assert weighted(terms[1], "colour") == pytest.approx(weighted(terms[0], "colour"), rel=1e-6)
 
 
@@ -84,10 +100,19 @@ def test_nothing_but_the_papers_terms(rendered):
 # ---- all terms at once, each with a weight of its own ----
 
 WEIGHTS = {
-    "colour_weight": 0.11, "eikonal_weight": 0.13, "mask_weight": 0.17, "light_weight": 0.19, "neutral_weight": 0.23,
-    "light_prior_weight": 0.53, "smoothness_weight": 0.29, "entropy_weight": 0.31, "metal_weight": 0.37, "binary_metal_weight": 0.41, "dark_metal_weight": 0.43,
+    "colour_weight": 0.11,
+    "eikonal_weight": 0.13,
+    "mask_weight": 0.17,
+    "light_weight": 0.19,
+    "neutral_weight": 0.23,
+    "light_prior_weight": 0.53,
+    "smoothness_weight": 0.29,
+    "entropy_weight": 0.31,
+    "metal_weight": 0.37,
+    "binary_metal_weight": 0.41,
+    "dark_metal_weight": 0.43,
     "occlusion_weight": 0.47,
-}  # fmt: skip
+}
 FIXED = {"light": 2.0, "neutral": 3.0, "entropy": 5.0, "occlusion": 7.0}
 
 
@@ -103,7 +128,9 @@ def every_term(rendered, monkeypatch):
         return lambda *args: asked.update({name: args}) or torch.tensor(FIXED[name])
 
     for name in FIXED:
-        function = {"light": "light_loss", "neutral": "neutral_light_loss", "entropy": "material_entropy_loss"}.get(name, f"{name}_loss")
+        function = {"light": "light_loss", "neutral": "neutral_light_loss", "entropy": "material_entropy_loss"}.get(
+            name, f"{name}_loss"
+        )
         monkeypatch.setattr(losses, function, fixed(name))
 
     def terms(step: int = 8, progress: float = 0.5, **settings):
@@ -129,8 +156,11 @@ def test_each_term_has_its_own_weight_and_its_own_value(rendered, every_term):
         "metal": (0.37, (w @ m.square()).item()),
         "binary_metal": (0.41, (w @ (m * (1 - m))).item()),
         "dark_metal": (0.43, (w @ (m * (1 - f0 / 0.4).clamp(min=0))).item()),
-        "light": (0.19, 2.0), "neutral": (0.23, 3.0), "entropy": (0.31, 5.0), "occlusion": (0.47, 7.0),
-    }  # fmt: skip
+        "light": (0.19, 2.0),
+        "neutral": (0.23, 3.0),
+        "entropy": (0.31, 5.0),
+        "occlusion": (0.47, 7.0),
+    }
     assert found["colour"][0] == pytest.approx(3 * 0.11) and found["smoothness"] == (0.29, 0.0)
     assert set(found) == {*expected, "colour", "smoothness"}
     for name, (weight, value) in expected.items():
@@ -169,7 +199,9 @@ def test_metals_are_drawn_to_their_sides_and_albedo_is_not(rendered):
     albedo = (0.8 * torch.rand(len(ray.shares), 3, generator=generator(6))).requires_grad_()
     w, m, f0 = ray.shares / ray.shares.sum(), ray.points.metallic.detach()[:, 0], albedo.detach().amax(1)
     slopes = {"metal": 2 * w * m, "binary_metal": w * (1 - 2 * m), "dark_metal": w * (1 - f0 / 0.4).clamp(min=0)}
-    fixed = dataclasses.replace(ray, mean=ray.mean.detach(), opacity=ray.opacity.detach(), gradients=ray.gradients.detach())
+    fixed = dataclasses.replace(
+        ray, mean=ray.mean.detach(), opacity=ray.opacity.detach(), gradients=ray.gradients.detach()
+    )
     for name, expected in slopes.items():
         metallic = ray.points.metallic.detach().clone().requires_grad_()
         alone = dict.fromkeys(WEIGHTS, 0.0) | {f"{name}_weight": 1.0, "priors_from": 0.0}

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from published_scenes import write_set
-
 from splitnerf.cli import DONE, main
 from splitnerf.evaluate import lpips as ours
 from splitnerf.evaluate.lpips import BACKBONE_WEIGHTS, find_distance, load_distance

@@ -11,18 +11,17 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from test_files import HOLDS
-from tiny_runs import as_options
-
 from splitnerf.cli import BAD_INPUT, build_parser, main
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import Share, share_of
+from splitnerf_tools.batch.scenes import Scene, keep_scenes, known_scenes, markdown, requested_scenes, scene_name
 from splitnerf_tools.batch.tasks import BatchPlan, run_batch
-from splitnerf_tools.batch.scenes import Scene, requested_scenes, keep_scenes, known_scenes, markdown, scene_name
 from splitnerf_tools.commands.batch import given_options
+from test_files import HOLDS
+from tiny_runs import as_options
 
 GB = 1e9
 
@@ -33,12 +32,23 @@ GB = 1e9
 @pytest.mark.parametrize(
     "folder, name",
     [
-        ("/a/chair", "chair"), ("/a/..", "scene"), ("/", "scene"), ("/a/-rf", "rf"), ("/a/.hidden", "hidden"),
-        ("/a/two words", "two_words"), ("/a/\x1b]0;owned\x07\n", "_0_owned_"), ("/a/K\u00e4fer", "K_fer"),
-        ("/a/\udcff", "_"), ("/a/$(reboot)", "_reboot_"), ("/a/logs", "logs-2"), ("/a/Batch.JSON", "Batch.JSON-2"),
-        ("/a/lock", "lock-2"), ("/a/Ray", "Ray-2"), ("/a/" + 300 * "x", 80 * "x"),
+        ("/a/chair", "chair"),
+        ("/a/..", "scene"),
+        ("/", "scene"),
+        ("/a/-rf", "rf"),
+        ("/a/.hidden", "hidden"),
+        ("/a/two words", "two_words"),
+        ("/a/\x1b]0;owned\x07\n", "_0_owned_"),
+        ("/a/K\u00e4fer", "K_fer"),
+        ("/a/\udcff", "_"),
+        ("/a/$(reboot)", "_reboot_"),
+        ("/a/logs", "logs-2"),
+        ("/a/Batch.JSON", "Batch.JSON-2"),
+        ("/a/lock", "lock-2"),
+        ("/a/Ray", "Ray-2"),
+        ("/a/" + 300 * "x", 80 * "x"),
     ],
-)  # fmt: skip
+)
 def test_a_name_is_that_of_the_folder_without_what_does_harm(folder, name):
     assert scene_name(folder, []) == name
 
@@ -52,11 +62,17 @@ def test_two_folders_of_one_name_are_two_scenes_and_stay_so(tmp_path):
     again = known_scenes(tmp_path)
     assert again == known
     asked = requested_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")])
-    assert [(s.name, s.data) for s in asked] == [("chair-4", "/d/chair"), ("Chair-3", "/c/Chair"), ("chair-2", "/b/chair")]
+    assert [(s.name, s.data) for s in asked] == [
+        ("chair-4", "/d/chair"),
+        ("Chair-3", "/c/Chair"),
+        ("chair-2", "/b/chair"),
+    ]
     assert [s.name for s in again] == ["chair", "chair-2", "Chair-3", "chair-4"]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 1, "scenes": [1]}', '{"format": 1, "scenes": [{"name": "a"}]}'])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"format": 1, "scenes": [1]}', '{"format": 1, "scenes": [{"name": "a"}]}']
+)
 def test_a_damaged_state_is_refused(tmp_path, text):
     (tmp_path / "batch.json").write_text(text)
     with pytest.raises(InputError, match="batch.json"):
@@ -67,8 +83,10 @@ def test_a_damaged_state_is_refused(tmp_path, text):
 
 
 def test_options_reach_each_training_as_they_were_given():
-    given = "--preset paper --n_steps 70 --max-minutes 1.5 --device cpu --seed 3 --deterministic --no-refine --downscale 2 \
+    given = (
+        "--preset paper --n_steps 70 --max-minutes 1.5 --device cpu --seed 3 --deterministic --no-refine --downscale 2 \
         --eval-mode all --mask-kind ignore --max-memory 2.5 --set a=-1 --set b=[1,2]".split()
+    )
     parsed = build_parser().parse_args(["batch", "S", "--out", "D", *given])
     words = given_options(parsed)
     trained = vars(build_parser().parse_args(["train", "S", *words]))
@@ -83,19 +101,26 @@ def test_every_option_of_train_is_one_of_batch_but_where_to_write():
         for name in ("train", "batch")
     }
     assert options["train"] - options["batch"] == {
-        "--output-dir", "--resume", "--overwrite", "--downscale-factor", "--view", "--tensorboard",
-    }  # fmt: skip
+        "--output-dir",
+        "--resume",
+        "--overwrite",
+        "--downscale-factor",
+        "--view",
+        "--tensorboard",
+    }
 
 
 @pytest.mark.parametrize(
     "words, said",
     [
-        (["--set", "no_such=1"], "no_such"), (["--max-minutes", "-1"], "--max-minutes must be positive"),
+        (["--set", "no_such=1"], "no_such"),
+        (["--max-minutes", "-1"], "--max-minutes must be positive"),
         (["--cores-per-scene", "0"], "--cores-per-scene must be positive"),
         (["--gpus-per-scene", "-1"], "--gpus-per-scene must not be negative"),
-        (["--memory-per-scene", "nan"], "--memory-per-scene must be positive"), (["--retries", "-1"], "--retries"),
+        (["--memory-per-scene", "nan"], "--memory-per-scene must be positive"),
+        (["--retries", "-1"], "--retries"),
     ],
-)  # fmt: skip
+)
 def test_wrong_options_are_refused_before_a_scene_begins(tmp_path, capsys, words, said):
     assert main(["batch", str(tmp_path / "a"), "--out", str(tmp_path / "out"), *words]) == BAD_INPUT
     error = capsys.readouterr().err
@@ -129,10 +154,14 @@ NOTHING_ASKED = dict(cores=None, gpus=None, memory=None)
 @pytest.mark.parametrize(
     "machines, n_scenes, share",
     [
-        ([LAPTOP], 6, Share(1, 0, 4)), ([LAPTOP], 1, Share(2, 0, 4)), ([{"CPU": 2.0, "memory": 3 * GB}], 6, Share(1, 0, 3)),
-        ([NODE, NODE], 100, Share(1, 0.25, 4)), ([NODE, NODE], 2, Share(16, 0.25, 4)), ([LAPTOP, NODE], 3, Share(6, 0.25, 4)),
+        ([LAPTOP], 6, Share(1, 0, 4)),
+        ([LAPTOP], 1, Share(2, 0, 4)),
+        ([{"CPU": 2.0, "memory": 3 * GB}], 6, Share(1, 0, 3)),
+        ([NODE, NODE], 100, Share(1, 0.25, 4)),
+        ([NODE, NODE], 2, Share(16, 0.25, 4)),
+        ([LAPTOP, NODE], 3, Share(6, 0.25, 4)),
     ],
-)  # fmt: skip
+)
 def test_scenes_share_the_machines(machines, n_scenes, share):
     assert share_of(machines, n_scenes, **NOTHING_ASKED) == share
 
@@ -150,7 +179,9 @@ def test_a_share_is_what_the_user_says():
 def test_more_than_a_machine_has_is_refused(asked):
     with pytest.raises(InputError, match="no machine offers .*; request less by --cores-per-scene"):
         share_of([LAPTOP], 1, **NOTHING_ASKED | asked)
-    with pytest.raises(InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"):  # one has the cores, the other the GPUs
+    with pytest.raises(
+        InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"
+    ):  # one has the cores, the other the GPUs
         share_of([{**NODE, "GPU": 0.0}, {**NODE, "CPU": 1.0}], 1, cores=2, gpus=1, memory=1)
 
 
@@ -189,11 +220,15 @@ def test_a_damaged_scene_is_refused_with_its_last_word(tmp_path):
 @pytest.mark.parametrize(
     "said, code, error",
     [
-        ("splitnerf: data: bad\nsplitnerf: note: a\n 10% 00:10\n", 2, "data: bad"), ("Segmentation fault\n\n", 1, "Segmentation fault"),
-        ("", 1, "ended with exit code 1"), ("splitnerf: x\n", -9, "was killed by SIGKILL"), ("splitnerf: x\n", 0, ""),
-        ("splitnerf: \x1b[31mred\n", 1, r"\x1b[31mred"), ("y" * 9000, 1, "y" * 500),
+        ("splitnerf: data: bad\nsplitnerf: note: a\n 10% 00:10\n", 2, "data: bad"),
+        ("Segmentation fault\n\n", 1, "Segmentation fault"),
+        ("", 1, "ended with exit code 1"),
+        ("splitnerf: x\n", -9, "was killed by SIGKILL"),
+        ("splitnerf: x\n", 0, ""),
+        ("splitnerf: \x1b[31mred\n", 1, r"\x1b[31mred"),
+        ("y" * 9000, 1, "y" * 500),
     ],
-)  # fmt: skip
+)
 def test_the_last_word_says_why(tmp_path, said, code, error):
     (tmp_path / "log").write_text("splitnerf: of an earlier one\n" + said)
     assert child.failure_line(tmp_path / "log", 29, code) == error
@@ -258,7 +293,9 @@ def test_a_cancelled_task_asks_its_process_to_save_and_waits(tmp_path, monkeypat
     """Ray cancels by KeyboardInterrupt."""
     told = tmp_path / "told"
     start, poll = subprocess.Popen, subprocess.Popen.poll
-    monkeypatch.setattr(child.subprocess, "Popen", lambda words, **rest: start([sys.executable, "-c", CHILD, str(told)], **rest))
+    monkeypatch.setattr(
+        child.subprocess, "Popen", lambda words, **rest: start([sys.executable, "-c", CHILD, str(told)], **rest)
+    )
 
     def interrupted(process):
         if told.exists() and told.read_text() == "works":
@@ -333,7 +370,11 @@ def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
     return batch, ray, rows, notes, run_batch(ray, batch, Share(1, 0, 4))
 
 
-KILLED, REFUSED, BROKE = Outcome(-9, "was killed by SIGKILL", False), Outcome(2, "bad", False), Outcome(1, "loss is nan", False)
+KILLED, REFUSED, BROKE = (
+    Outcome(-9, "was killed by SIGKILL", False),
+    Outcome(2, "bad", False),
+    Outcome(1, "loss is nan", False),
+)
 LOST = ERRORS.WorkerCrashedError()
 
 
@@ -356,8 +397,10 @@ def test_only_killed_scenes_are_tried_again(tmp_path):
     assert ended and ray.begun == ["/a", "/b", "/c", "/d", "/e", "/a", "/c", "/a"]
     assert rows == [("b", "done"), ("d", "refused"), ("e", "failed"), ("c", "done"), ("a", "done")]
     assert [note.partition(";")[0] for note in notes] == [
-        "a: its worker was killed", "c: stopped at step 8", "a: was killed by SIGKILL"
-    ]  # fmt: skip
+        "a: its worker was killed",
+        "c: stopped at step 8",
+        "a: was killed by SIGKILL",
+    ]
     assert [note[-11:] for note in notes] == ["retry 1 of 3"[1:], "retry 1 of 3"[1:], "retry 2 of 3"[1:]]
     found = {scene.name: scene for scene in known_scenes(tmp_path)}
     assert found["a"].minutes == 2 and found["a"].steps == 4 and found["a"].scores == {"views": 30.0}
@@ -374,7 +417,9 @@ def test_retries_come_to_an_end(tmp_path):
 def test_an_interrupt_cancels_all_and_waits_for_them(tmp_path):
     finish_run(tmp_path / "a")
     finish_run(tmp_path / "b")
-    batch, ray, rows, notes, ended = batch_of(tmp_path, {"/a": [Outcome(0, "", False)], "/b": [KeyboardInterrupt], "/c": [LOST]})
+    batch, ray, rows, notes, ended = batch_of(
+        tmp_path, {"/a": [Outcome(0, "", False)], "/b": [KeyboardInterrupt], "/c": [LOST]}
+    )
     assert not ended and rows == [("a", "done"), ("b", "stopped"), ("c", "waiting")] and len(ray.cancelled) == 2
     ends = {"/a": [Outcome(0, "", False)], "/b": [REFUSED], "/c": [Outcome(0, "", False)]}
     assert batch_of(tmp_path, ends)[2] == [("a", "done"), ("b", "refused"), ("c", "done")]  # a second call

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-
 from contextlib import contextmanager
 
 import numpy as np
@@ -11,13 +10,12 @@ import pytest
 import torch
 import trimesh
 from pretend_gpu import GPU, pretend_gpu
-
+from splitnerf.config import preset
 from splitnerf.fields.occlusion import TracedBits
 from splitnerf.ops import SdfNetwork
-from splitnerf.training import meshes
-from splitnerf.config import preset
-from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.render.model import SceneModel
+from splitnerf.training import meshes
+from splitnerf.training.meshes import SurfaceMesh
 
 SMALL = {"n_levels": 2, "start_levels": 2, "log2_table_size": 8, "mesh_resolution": 24, "light_resolution": 16}
 
@@ -160,5 +158,14 @@ def test_beside_it_works_in_a_stream_of_its_own_and_brings_the_bits_to_the_devic
         mesh.request(0.1)
         mesh.poll(wait=True)
         assert mesh.current is not None and model.occlusion.cache.bits.device == GPU
-    made = ["copied", "ours waits for theirs", "in ours", "moved", "out of ours", "theirs waits for ours", "used", "moved"]
+    made = [
+        "copied",
+        "ours waits for theirs",
+        "in ours",
+        "moved",
+        "out of ours",
+        "theirs waits for ours",
+        "used",
+        "moved",
+    ]
     assert told == made

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-
 from splitnerf import _core
 from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
@@ -36,7 +35,10 @@ def test_sphere_converges_in_area_and_volume():
     errors = []
     for n in (17, 33, 65):
         mesh = trimesh.Trimesh(*extract_mesh(sphere, 1.5, n), process=False)
-        assert mesh.is_watertight and np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.3 * (3 / (n - 1)) ** 2
+        assert (
+            mesh.is_watertight
+            and np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.3 * (3 / (n - 1)) ** 2
+        )
         errors.append([4 / 3 * math.pi * RADIUS**3 - mesh.volume, 4 * math.pi * RADIUS**2 - mesh.area])
     errors = np.array(errors)
     assert (errors > 0).all()  # chords lie inside
@@ -107,7 +109,9 @@ def test_small_components_go_and_are_counted():
         return torch.minimum(sphere(x), torch.minimum(sphere(x - far, 0.05), sphere(x - near, 0.2)))
 
     vertices, faces = extract_mesh(three, 1.5, 96)
-    vertices = np.concatenate([vertices, np.full((3, 3), 9.0, np.float32)])  # of no face: no component, and gone as well
+    vertices = np.concatenate(
+        [vertices, np.full((3, 3), 9.0, np.float32)]
+    )  # of no face: no component, and gone as well
     vertices, faces, n_dropped = drop_floaters_and_cavities(vertices, faces)
     assert n_dropped == 1  # the middle one has more than a hundredth of the faces
     assert vertices.max() == pytest.approx(RADIUS, abs=0.01) and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
@@ -188,6 +192,8 @@ def test_decimation_parts_what_touches_and_drops_sheets_without_volume(monkeypat
     """Two tetrahedra that share an edge, and a pair of faces with the same three vertices: closed, at once, without the pair."""
     other = np.where(TETRAHEDRON < 2, TETRAHEDRON, TETRAHEDRON + 2)
     sheet = np.array([[0, 7, 8], [8, 7, 0]])
-    asked, (vertices, (points, faces)) = decimated(monkeypatch, [np.concatenate([TETRAHEDRON, other, sheet])], TETRAHEDRON)
+    asked, (vertices, (points, faces)) = decimated(
+        monkeypatch, [np.concatenate([TETRAHEDRON, other, sheet])], TETRAHEDRON
+    )
     assert len(points) == 8 and len(faces) == 8 and is_closed(faces)
     np.testing.assert_array_equal(points[faces], vertices[np.concatenate([TETRAHEDRON, other])])

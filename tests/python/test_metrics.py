@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 import trimesh
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import resize_environment
 from splitnerf.data.truth import ViewTruth
@@ -86,7 +85,9 @@ def test_light_psnr_is_judged_up_to_the_99th_percentile_of_the_truth():
     scale = (weights * light[..., 0] * truth[..., 0]).sum() / (weights * light[..., 0] ** 2).sum()
     error = np.minimum(scale * light[..., 0], 1.0) - np.minimum(truth[..., 0], 1.0)
     assert 1.25 < scale < 1.375
-    assert metrics.light_psnr(light, truth) == pytest.approx(-10 * np.log10((weights * error**2).sum() / weights.sum()), abs=1e-4)
+    assert metrics.light_psnr(light, truth) == pytest.approx(
+        -10 * np.log10((weights * error**2).sum() / weights.sum()), abs=1e-4
+    )
 
 
 def test_resize_environment_wraps_around_and_keeps_constants():
@@ -135,9 +136,18 @@ def make_inputs():
 
 
 KEYS = [
-    "novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
-    "light_psnr", "chamfer", "f_score", "seconds", "views",
-]  # fmt: skip
+    "novel_view",
+    "albedo",
+    "relight",
+    "normal_mae_deg",
+    "roughness_mae",
+    "metallic_balanced_accuracy",
+    "light_psnr",
+    "chamfer",
+    "f_score",
+    "seconds",
+    "views",
+]
 
 
 def test_protocol_scores_the_truth_as_perfect():

@@ -8,12 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from tiny_runs import lines_of, tiny
-
 from splitnerf.cli import DONE, main
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
+from splitnerf.pipeline import load_run, reconstruct
 from splitnerf.progress import Interrupt
 from splitnerf.refinement.job import STATE
 from splitnerf.training import loop
@@ -21,7 +20,7 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import NOBODY, Observer, Request, together
 from splitnerf.training.schedule import light_period
-from splitnerf.pipeline import load_run, reconstruct
+from tiny_runs import lines_of, tiny
 
 CPU = torch.device("cpu")
 
@@ -61,7 +60,9 @@ def test_observers_learn_of_all_that_happens(data, tmp_path):
     assert heard[0] == ("begun", 0) and [event for event in heard if event[0] == "step"] == [
         ("step", n) for n in range(period, 41, period)
     ]
-    assert [event[1] for event in heard if event[0] == "logged"] == [line["step"] for line in lines_of(tmp_path / "run")]
+    assert [event[1] for event in heard if event[0] == "logged"] == [
+        line["step"] for line in lines_of(tmp_path / "run")
+    ]
     assert [event for event in heard if event[0] == "previewed"] == [("previewed", 20, True), ("previewed", 40, True)]
     assert heard[-2:] == [("export", None), ("evaluation", True)]
     assert second.heard == heard
@@ -138,7 +139,9 @@ def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
 def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
     asking = Asking(8, Request.SAVE, None, Request.STOP)
     steps = []
-    asking.logged = lambda line: steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.requests) == 1 else None
+    asking.logged = lambda line: (
+        steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.requests) == 1 else None
+    )
     trained(data, tmp_path, tiny(steps=400), asking)
     assert set(steps) == {8}
 
@@ -157,9 +160,12 @@ def test_the_time_of_a_pause_is_told(monkeypatch):
     monkeypatch.setattr(loop, "time", fake)
     done = []
     training = SimpleNamespace(
-        observer=Asking(0, Request.PAUSE, Request.PAUSE, Request.SAVE, Request.PAUSE), stopped=False, step=1,
-        settle=lambda: done.append("settle"), save=lambda: done.append("save"),
-    )  # fmt: skip
+        observer=Asking(0, Request.PAUSE, Request.PAUSE, Request.SAVE, Request.PAUSE),
+        stopped=False,
+        step=1,
+        settle=lambda: done.append("settle"),
+        save=lambda: done.append("save"),
+    )
     with Interrupt() as interrupt:
         assert Training.fulfil_requests(training, interrupt) == pytest.approx(3 * loop.PAUSE)
     assert done == ["settle", "settle", "settle", "save", "settle"]

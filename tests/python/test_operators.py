@@ -13,27 +13,55 @@ import reference
 import torch
 from bench.hash_grid import SPEC
 from op_cases import (
-    CASES, EVERY, ON_THE_CPU_ALONE, cached_occlusion_inputs, cached_visibility_inputs, check_against_the_cpu, lookup_inputs, pixel_inputs,
-    sdf_field_inputs, shared_inputs, sparse_inputs, truth,
-)  # fmt: skip
+    CASES,
+    EVERY,
+    ON_THE_CPU_ALONE,
+    cached_occlusion_inputs,
+    cached_visibility_inputs,
+    check_against_the_cpu,
+    lookup_inputs,
+    pixel_inputs,
+    sdf_field_inputs,
+    shared_inputs,
+    sparse_inputs,
+    truth,
+)
 from op_checks import as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
-from torch.autograd import forward_ad
-from torch.utils.checkpoint import checkpoint
-
 from splitnerf import _core
 from splitnerf.ops import MeshScene, linear_to_srgb
+from torch.autograd import forward_ad
+from torch.utils.checkpoint import checkpoint
 
 WRITES_TO_ARGUMENTS = {"adamw_steps_"}  # has no outputs: see test_ops_adamw.py
 # The inputs to which there is a gradient.
 DIFFERENTIABLE = {
-    "hash_encode": (0, 1), "sdf_field": range(1, 8), "surface_weights": (0, 1, 3), "composite": (0, 1, 3), "interpolate": (0,),
-    "light_queries": (0, 2), "split_sum_shade": range(9), "shade_sums": (*range(6), 8), "monte_carlo_light": (0, 2, 5),
-    "summed_light": (0, 2, 5), "linear_to_srgb": (0,), "prefilter_light": (3,), "sparse_product": (6,),
-    "light_lookup": (0, 1, 2, 3), "pixel_losses": (0, 1), "gradient_losses": (0,), "quadratic_entropy": (0,), "light_prior": (0,),
-}  # fmt: skip
+    "hash_encode": (0, 1),
+    "sdf_field": range(1, 8),
+    "surface_weights": (0, 1, 3),
+    "composite": (0, 1, 3),
+    "interpolate": (0,),
+    "light_queries": (0, 2),
+    "split_sum_shade": range(9),
+    "shade_sums": (*range(6), 8),
+    "monte_carlo_light": (0, 2, 5),
+    "summed_light": (0, 2, 5),
+    "linear_to_srgb": (0,),
+    "prefilter_light": (3,),
+    "sparse_product": (6,),
+    "light_lookup": (0, 1, 2, 3),
+    "pixel_losses": (0, 1),
+    "gradient_losses": (0,),
+    "quadratic_entropy": (0,),
+    "light_prior": (0,),
+}
 FORWARD = sorted(name for name in EVERY if "_backward" not in name)
-BEHIND = {"read_pixels", "occlusion_factors", "incoming_light", "visibility_bits"}  # the points are their second argument
+BEHIND = {
+    "read_pixels",
+    "occlusion_factors",
+    "incoming_light",
+    "visibility_bits",
+}  # the points are their second argument
 WHOLE_NUMBERS = {"visibility_bits", "vertex_grids"}  # their results
 TWICE = {"sparse_product"}  # whose gradient has gradients
 
@@ -80,29 +108,59 @@ def deep_light(dtype: torch.dtype) -> tuple:
 def far_points(dtype: torch.dtype) -> tuple:
     """Some lie off the mesh by more than the radius in which vertices count at first, some by more than any."""
     x, normals, *rest = cached_visibility_inputs(dtype)
-    return x + normals * rest[4] * torch.tensor([0.2, 1.5, 3.0, 5.0, 0.0, 1.2, 2.5, 9.0, 99.0]).to(dtype)[:, None], normals, *rest
+    return (
+        x + normals * rest[4] * torch.tensor([0.2, 1.5, 3.0, 5.0, 0.0, 1.2, 2.5, 9.0, 99.0]).to(dtype)[:, None],
+        normals,
+        *rest,
+    )
 
 
 # Other settings of the same operators: what the first case of each does not reach.
 OTHERS = [
-    *(("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
-      for mode in (0, 1, 2) for gain in (False, True)),
+    *(
+        ("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
+        for mode in (0, 1, 2)
+        for gain in (False, True)
+    ),
     ("light_queries", lambda t: query_inputs("cpu", t, False, 300)),
     ("shade_sums", lambda t: mixed_sums_inputs(300, t, compensate=False)),
-    *(("surface_weights", lambda t, anneal=anneal: (*CASES["surface_weights"](t)[:6], torch.tensor(anneal, dtype=t), 0.3, CASES["surface_weights"](t)[8]))
-      for anneal in (0.0, 1.0)),
+    *(
+        (
+            "surface_weights",
+            lambda t, anneal=anneal: (
+                *CASES["surface_weights"](t)[:6],
+                torch.tensor(anneal, dtype=t),
+                0.3,
+                CASES["surface_weights"](t)[8],
+            ),
+        )
+        for anneal in (0.0, 1.0)
+    ),
     ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
     ("light_lookup", deep_light),
     ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
     ("summed_light", lambda t: shared_inputs(700, dtype=t)),
-    *(("split_sum_shade", lambda t, channels=channels: indirect_inputs(t, 2, channels, 40, stacked=True)) for channels in (1, 3)),
+    *(
+        ("split_sum_shade", lambda t, channels=channels: indirect_inputs(t, 2, channels, 40, stacked=True))
+        for channels in (1, 3)
+    ),
     ("cached_visibility", far_points),
     ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
-    *(("sdf_field", lambda t, n=n, n_active=n_active: (*(x := sdf_field_inputs(n, t))[:13], n_active, x[14]))  # tiles of 64 points
-      for n, n_active in ((1, 3), (63, 0), (64, 3), (65, 2), (1500, 3))),
-    *(("quadratic_entropy", lambda t, n=n, shift=shift: (2 * torch.randn(n, 5, generator=generator(), dtype=t) + shift,))
-      for n, shift in ((2, 0.0), (31, 1000.0), (200, 1000.0))),
-]  # fmt: skip
+    *(
+        (
+            "sdf_field",
+            lambda t, n=n, n_active=n_active: (*(x := sdf_field_inputs(n, t))[:13], n_active, x[14]),
+        )  # tiles of 64 points
+        for n, n_active in ((1, 3), (63, 0), (64, 3), (65, 2), (1500, 3))
+    ),
+    *(
+        (
+            "quadratic_entropy",
+            lambda t, n=n, shift=shift: (2 * torch.randn(n, 5, generator=generator(), dtype=t) + shift,),
+        )
+        for n, shift in ((2, 0.0), (31, 1000.0), (200, 1000.0))
+    ),
+]
 REFERENCES = sorted({name for name, _ in inspect.getmembers(reference, inspect.isfunction)} & set(CASES))
 
 
@@ -144,9 +202,13 @@ def test_the_grid_of_the_benchmark_is_the_operator():
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=["float32", "float64"])
 @pytest.mark.parametrize(
-    ("op", "device"), [pytest.param(op, *(d.values if hasattr(d, "values") else (d,)), marks=getattr(d, "marks", ()))
-                       for op in CASES for d in devices(op)],
-)  # fmt: skip
+    ("op", "device"),
+    [
+        pytest.param(op, *(d.values if hasattr(d, "values") else (d,)), marks=getattr(d, "marks", ()))
+        for op in CASES
+        for d in devices(op)
+    ],
+)
 def test_the_results_are_those_of_the_cpu_in_float64(op, device, dtype):
     if op == "sample_rays" and dtype == torch.float32 and device == "cuda":
         pytest.skip("the network's roundings decide which samples are kept")
@@ -178,12 +240,20 @@ def read_in_16_bits(name: str, table: int, dtype: torch.dtype) -> tuple:
 FORMS = [
     ("cached_occlusion", lambda: cached_occlusion_inputs(torch.float32, with_hits=False), ()),
     ("cached_visibility", lambda: cached_visibility_inputs(torch.float32, with_hits=False), ()),
-    *((name, lambda args=args: read_in_16_bits(*args), gradients) for half in (torch.float16, torch.bfloat16) for name, *args, gradients in (
-        ("hash_encode", "hash_encode", 1, half, (0,)), ("sdf_values", "sdf_values", 1, half, ()),
-        ("hash_encode_backward_positions", "hash_encode_backward_positions", 1, half, ()))),
-    *(("hash_encode", lambda half=half: (*(x := CASES["hash_encode"](torch.float32)), x[1].to(half)), (0, 1))
-      for half in (torch.float16, torch.bfloat16)),
-]  # fmt: skip
+    *(
+        (name, lambda args=args: read_in_16_bits(*args), gradients)
+        for half in (torch.float16, torch.bfloat16)
+        for name, *args, gradients in (
+            ("hash_encode", "hash_encode", 1, half, (0,)),
+            ("sdf_values", "sdf_values", 1, half, ()),
+            ("hash_encode_backward_positions", "hash_encode_backward_positions", 1, half, ()),
+        )
+    ),
+    *(
+        ("hash_encode", lambda half=half: (*(x := CASES["hash_encode"](torch.float32)), x[1].to(half)), (0, 1))
+        for half in (torch.float16, torch.bfloat16)
+    ),
+]
 
 
 @pytest.mark.parametrize(
@@ -267,10 +337,25 @@ assert x.grad is not None
 
 # Operators whose results at a point depend on nothing else of the call.
 BY_POINT = (
-    "hash_encode", "sdf_field", "sdf_values", "split_sum_shade", "prefilter_light", "sample_ggx_lobe", "light_lookup", "monte_carlo_light",
-    "summed_light", "shade_sums", "linear_to_srgb", "srgb_to_linear", "read_pixels", "cached_occlusion", "cached_visibility",
-    "occlusion_factors", "incoming_light", "visibility_bits",
-)  # fmt: skip
+    "hash_encode",
+    "sdf_field",
+    "sdf_values",
+    "split_sum_shade",
+    "prefilter_light",
+    "sample_ggx_lobe",
+    "light_lookup",
+    "monte_carlo_light",
+    "summed_light",
+    "shade_sums",
+    "linear_to_srgb",
+    "srgb_to_linear",
+    "read_pixels",
+    "cached_occlusion",
+    "cached_visibility",
+    "occlusion_factors",
+    "incoming_light",
+    "visibility_bits",
+)
 NONE_3, NONE, LONG = torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, dtype=torch.int64)
 CELLS = torch.ones(4, 4, 4, dtype=torch.uint8)
 # The others without a point, or without a sample on two rays.
@@ -280,21 +365,31 @@ EMPTY = {
     "sample_rays": lambda t: (NONE_3, NONE_3, NONE, *CASES["sample_rays"](torch.float32)[3:]),
     "draw_rays": lambda t: (NONE, 0, *CASES["draw_rays"](torch.float32)[2:]),
     "surface_weights": lambda t: (
-        NONE, NONE_3, torch.eye(3)[:2], torch.tensor(9.0), torch.zeros(3, dtype=torch.int64), *torch.tensor([0.1, 1.0]), 0.0, -1
+        NONE,
+        NONE_3,
+        torch.eye(3)[:2],
+        torch.tensor(9.0),
+        torch.zeros(3, dtype=torch.int64),
+        *torch.tensor([0.1, 1.0]),
+        0.0,
+        -1,
     ),
     "composite": lambda t: (NONE, NONE_3, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 0.1),
     "spread_samples": lambda t: (NONE, NONE, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 1.0, 2),
     "interpolate": lambda t: (torch.ones(2, 3), LONG, LONG, NONE),
     "pixel_losses": lambda t: (NONE_3, NONE, torch.zeros(0, 4), NONE_3, None, None, True),
     "gradient_losses": lambda t: (NONE_3, NONE, LONG),
-}  # fmt: skip
+}
 ALWAYS_SOME = {"sparse_product", "quadratic_entropy", "light_prior", "vertex_grids"}
 
 
 @pytest.mark.parametrize("name", BY_POINT)
 def test_one_point_alone_is_that_point_among_others_and_none_is_none(name):
     inputs = smaller(name, torch.float64)
-    among, alone, none = (as_tuple(getattr(lib, name)(*x)) for x in (inputs, smaller(name, torch.float64, 1), smaller(name, torch.float64, 0)))
+    among, alone, none = (
+        as_tuple(getattr(lib, name)(*x))
+        for x in (inputs, smaller(name, torch.float64, 1), smaller(name, torch.float64, 0))
+    )
     for many, one, nothing in zip(among, alone, none, strict=True):
         torch.testing.assert_close(one, many[: len(one)], rtol=1e-12, atol=1e-12)
         assert len(one) == min(1, len(many)) and nothing.shape == (0, *many.shape[1:])
@@ -410,7 +505,10 @@ ERRORS = [
     ("read_pixels", 2, lambda view: view + 1, "view must hold numbers of photos"),
     ("read_pixels", 6, without, "edge_ends must be [2]"),
     ("composite", 3, without, "opacity must be [4]"),
-    *(("cached_occlusion", i, without, name) for i, name in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (13, "light"))),
+    *(
+        ("cached_occlusion", i, without, name)
+        for i, name in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (13, "light"))
+    ),
     ("cached_occlusion", 7, lambda order: order + 1, "order"),
     ("cached_occlusion", 11, lambda radiance: radiance[:, :2], "radiance"),
     ("cached_visibility", 1, without, "normals"),
@@ -420,15 +518,41 @@ ERRORS = [
     ("occlusion_factors", 2, without, "normals must be [9, 3]"),
     ("occlusion_factors", 5, lambda sky: sky[:0], "at least one texel"),
     ("occlusion_factors", 6, lambda n: 0, "n_specular_rays must be in [1, 2^20]"),
-    *(("incoming_light", i, without, f"{name} must be [9, ")
-      for i, name in ((2, "geometric_normals"), (3, "normals"), (4, "view_dirs"), (5, "albedo"), (6, "roughness"), (7, "metallic"))),
-    *(("incoming_light", i, without, f"{name} must be [78, ") for i, name in ((8, "vertex_normals"), (9, "tangents"), (10, "uv"))),
-    *(("incoming_light", i, lambda x: x[..., :1], name) for i, name in ((11, "albedo_map"), (12, "roughness_metallic_map"), (13, "normal_map"))),
+    *(
+        ("incoming_light", i, without, f"{name} must be [9, ")
+        for i, name in (
+            (2, "geometric_normals"),
+            (3, "normals"),
+            (4, "view_dirs"),
+            (5, "albedo"),
+            (6, "roughness"),
+            (7, "metallic"),
+        )
+    ),
+    *(
+        ("incoming_light", i, without, f"{name} must be [78, ")
+        for i, name in ((8, "vertex_normals"), (9, "tangents"), (10, "uv"))
+    ),
+    *(
+        ("incoming_light", i, lambda x: x[..., :1], name)
+        for i, name in ((11, "albedo_map"), (12, "roughness_metallic_map"), (13, "normal_map"))
+    ),
     *(("incoming_light", i, lambda x: x[:0], "must not be empty") for i in (11, 12, 13, 14)),
-    *(("incoming_light", i, lambda x: x + torch.nan, f"{name} must be finite")
-      for i, name in ((8, "normals"), (9, "tangents"), (10, "uv"), (13, "normal textures"), (14, "environment radiance"))),
-    *(("incoming_light", i, lambda x, more=more: x + more, name)
-      for i, name in ((11, "albedo"), (12, "roughness and metallic")) for more in (torch.nan, 1.5)),
+    *(
+        ("incoming_light", i, lambda x: x + torch.nan, f"{name} must be finite")
+        for i, name in (
+            (8, "normals"),
+            (9, "tangents"),
+            (10, "uv"),
+            (13, "normal textures"),
+            (14, "environment radiance"),
+        )
+    ),
+    *(
+        ("incoming_light", i, lambda x, more=more: x + more, name)
+        for i, name in ((11, "albedo"), (12, "roughness and metallic"))
+        for more in (torch.nan, 1.5)
+    ),
     ("incoming_light", 14, lambda sky: -sky, "not negative"),
     *(("incoming_light", 15, lambda _, n=n: n, "n_directions must be in [2, 65536]") for n in (1, 1 << 17)),
     *(("incoming_light", 16, lambda _, n=n: n, "max_bounces must be in [0, 64]") for n in (-1, 65)),

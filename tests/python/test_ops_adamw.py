@@ -9,10 +9,9 @@ import pytest
 import torch
 from op_cases import HASH_SPEC
 from op_checks import check_error, devices, generator, lib
-
-from splitnerf.training.checkpoint import restore_optimiser
 from splitnerf.ops import AdamW, HashGrid
 from splitnerf.ops.hash_grid import rounded
+from splitnerf.training.checkpoint import restore_optimiser
 
 SHAPES = [(), (7,), (1000, 2), (37, 1), (5, 300), (3, 2, 4), (0, 2)]
 SETTINGS = {"lr": 0.01, "betas": (0.9, 0.99), "eps": 1e-15, "weight_decay": 0.1}
@@ -241,7 +240,9 @@ def test_many_parameters_move_as_each_alone(device, count):
     tensors = [[torch.rand(shape, generator=g).to(device) for shape in shapes] for _ in range(4)]
     for grad in tensors[1][::2]:
         grad *= (torch.rand(grad.shape, generator=g) < 0.3).to(device)
-    rates, decays, steps = ([f(k) for k in range(count)] for f in (lambda k: 0.01 * k, lambda k: 0.1 * (k % 3), lambda k: 1 + k % 5))
+    rates, decays, steps = (
+        [f(k) for k in range(count)] for f in (lambda k: 0.01 * k, lambda k: 0.1 * (k % 3), lambda k: 1 + k % 5)
+    )
     sparse, copied = [k % 2 == 0 for k in range(count)], sorted({0, count - 1})
     alone = [[x.clone() for x in kind] for kind in tensors]
     copies = [torch.zeros(shapes[k], dtype=torch.float16, device=device) for k in copied]
@@ -297,8 +298,10 @@ def test_groups_with_settings_of_their_own_move_as_those_of_torch():
     for kind in (AdamW, torch.optim.AdamW):
         params = [torch.nn.Parameter(torch.linspace(-1, 2, 5, dtype=torch.float64) + k) for k in range(4)]
         groups = [
-            {"params": params[:1], "lr": 0.1, "weight_decay": 0.2}, {"params": params[1:2], "weight_decay": 0.0},
-            {"params": params[2:3], "betas": (0.5, 0.7)}, {"params": params[3:], "eps": 0.3},
+            {"params": params[:1], "lr": 0.1, "weight_decay": 0.2},
+            {"params": params[1:2], "weight_decay": 0.0},
+            {"params": params[2:3], "betas": (0.5, 0.7)},
+            {"params": params[3:], "eps": 0.3},
         ]
         optimiser = kind(groups, lr=0.03)
         for step in range(8):
@@ -339,16 +342,26 @@ ONE, FOUR = torch.ones(3, 2), torch.ones(4)
 WRONG = [
     (0, [ONE.long(), FOUR], "param", "float32 or float64", "int64"),
     (0, [ONE.t().contiguous().t(), FOUR], "param", "contiguous"),
-    (0, [ONE, FOUR.double()], "params must be [4] float32", "float64"), (1, [ONE], "grads must hold 2, got 1"),
+    (0, [ONE, FOUR.double()], "params must be [4] float32", "float64"),
+    (1, [ONE], "grads must hold 2, got 1"),
     (1, [ONE[:2], FOUR], "grad", "[3, 2] float32", "[2, 2] float32"),
-    (1, [ONE.double(), FOUR], "grad", "float32", "float64"), (2, [ONE, torch.ones(5)], "exp_avg must be [4]", "[5]"),
-    (3, [ONE.t().contiguous().t(), FOUR], "exp_avg_sq", "contiguous"), (4, [0.1] * 3, "lrs must hold 2, got 3"),
-    (4, [0.1, -0.1], "lr", "-0.1"), (4, [math.nan, 0.1], "lr", "nan"), (5, 1.0, "beta1", "[0, 1)", "1.0"),
-    (6, -0.5, "beta2", "[0, 1)"), (7, -1.0, "eps"), (8, [0.0, -1.0], "weight_decay"),
-    (9, [1, 0], "step must be at least 1, got 0"), (10, [True], "sparse must hold 2, got 1"),
+    (1, [ONE.double(), FOUR], "grad", "float32", "float64"),
+    (2, [ONE, torch.ones(5)], "exp_avg must be [4]", "[5]"),
+    (3, [ONE.t().contiguous().t(), FOUR], "exp_avg_sq", "contiguous"),
+    (4, [0.1] * 3, "lrs must hold 2, got 3"),
+    (4, [0.1, -0.1], "lr", "-0.1"),
+    (4, [math.nan, 0.1], "lr", "nan"),
+    (5, 1.0, "beta1", "[0, 1)", "1.0"),
+    (6, -0.5, "beta2", "[0, 1)"),
+    (7, -1.0, "eps"),
+    (8, [0.0, -1.0], "weight_decay"),
+    (9, [1, 0], "step must be at least 1, got 0"),
+    (10, [True], "sparse must hold 2, got 1"),
     (11, [FOUR], "copy", "float16 or bfloat16", "float32"),
-    (11, [torch.ones(3).half()], "copy must be [4] float16", "[3]"), (12, [2], "copied must hold positions in params"),
-    (12, [0, 1], "copied must hold 1, got 2"), ((11, 12), lambda x: x * 2, "copied must hold no position twice"),
+    (11, [torch.ones(3).half()], "copy must be [4] float16", "[3]"),
+    (12, [2], "copied must hold positions in params"),
+    (12, [0, 1], "copied must hold 1, got 2"),
+    ((11, 12), lambda x: x * 2, "copied must hold no position twice"),
     (13, torch.tensor([True]), "allowed must be [] bool"),
 ]
 

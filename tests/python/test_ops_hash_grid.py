@@ -6,7 +6,6 @@ import pytest
 import torch
 from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, hash_inputs, sampling_settings
 from op_checks import DEVICES, check_error, generator, lib
-
 from splitnerf.fields.sdf import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, sample_rays
 
@@ -26,8 +25,17 @@ def test_positions_outside_and_nan(device):
     assert features[2].isnan().all() and not features[[0, 1, 3, 4]].isnan().any()
 
 
-IMPOSSIBLE = [("n_levels", 0), ("n_levels", 33), ("n_features", 3), ("base_resolution", 0), ("growth", 0.9), ("growth", float("nan")),
-              ("log2_table_size", 0), ("log2_table_size", 64), ("base_resolution", 2**40)]  # fmt: skip
+IMPOSSIBLE = [
+    ("n_levels", 0),
+    ("n_levels", 33),
+    ("n_features", 3),
+    ("base_resolution", 0),
+    ("growth", 0.9),
+    ("growth", float("nan")),
+    ("log2_table_size", 0),
+    ("log2_table_size", 64),
+    ("base_resolution", 2**40),
+]
 
 
 @pytest.mark.parametrize(("name", "value"), IMPOSSIBLE)
@@ -200,7 +208,9 @@ def test_the_field_reads_the_copy(dtype):
     a, b = rounded.sample(x), plain.sample(x)
     assert torch.equal(a.outputs, b.outputs) and torch.equal(a.gradient, b.gradient)
     o, d, jitter = (t.float() for t in field_rays())
-    samples = [sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)]
+    samples = [
+        sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)
+    ]
     assert len(samples[0][0].t_starts) > 30
     for got, expected in zip((*samples[0][0], samples[0][1]), (*samples[1][0], samples[1][1])):
         assert torch.equal(got, expected)

@@ -10,10 +10,17 @@ import torch
 import trimesh
 from mesh_shapes import grid_mesh, scene_of
 from op_checks import generator, unit
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops import IncomingLight, MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums, split_sum_shade
+from splitnerf.ops import (
+    IncomingLight,
+    MeshScene,
+    TexturedSurface,
+    incoming_light,
+    monte_carlo_light,
+    shade_sums,
+    split_sum_shade,
+)
 from splitnerf.render.path_traced import AssetRenderer
 
 SIGMAS = 4.5
@@ -27,9 +34,14 @@ def plain_surface(mesh: trimesh.Trimesh, roughness: float = 1.0, metallic: float
     """A white mesh whose normals are the triangles'."""
     n = len(mesh.vertices)
     return TexturedSurface(
-        scene_of(mesh), torch.zeros(n, 3), torch.zeros(n, 4), torch.zeros(n, 2), torch.ones(1, 1, 3),
-        torch.tensor([[[roughness, metallic]]]), torch.tensor([[[0.0, 0.0, 1.0]]]),
-    )  # fmt: skip
+        scene_of(mesh),
+        torch.zeros(n, 3),
+        torch.zeros(n, 4),
+        torch.zeros(n, 2),
+        torch.ones(1, 1, 3),
+        torch.tensor([[[roughness, metallic]]]),
+        torch.tensor([[[0.0, 0.0, 1.0]]]),
+    )
 
 
 def under_a_roof() -> trimesh.Trimesh:
@@ -42,9 +54,14 @@ def flat_points(n: int, n_dot_v: float = 0.8) -> dict[str, torch.Tensor]:
     up = torch.tensor([0.0, 0.0, 1.0]).repeat(n, 1)
     view = torch.tensor([math.sqrt(1 - n_dot_v**2), 0.0, n_dot_v]).repeat(n, 1)
     return {
-        "positions": 0 * up, "geometric_normals": up, "normals": up, "view_dirs": view, "albedo": torch.ones(n, 3),
-        "roughness": torch.ones(n, 1), "metallic": torch.zeros(n, 1),
-    }  # fmt: skip
+        "positions": 0 * up,
+        "geometric_normals": up,
+        "normals": up,
+        "view_dirs": view,
+        "albedo": torch.ones(n, 3),
+        "roughness": torch.ones(n, 1),
+        "metallic": torch.zeros(n, 1),
+    }
 
 
 def furnished_corner() -> Asset:
@@ -59,15 +76,21 @@ def furnished_corner() -> Asset:
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     tilts = np.concatenate([random.uniform(-0.4, 0.4, (8, 8, 2)), np.ones((8, 8, 1))], axis=2)
     material = Material(
-        metallic=1.0, albedo_texture=random.uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32),
+        metallic=1.0,
+        albedo_texture=random.uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32),
         roughness_metallic_texture=random.uniform(0.15, 0.9, (8, 8, 2)).astype(np.float32),
         normal_texture=(tilts / np.linalg.norm(tilts, axis=2, keepdims=True)).astype(np.float32),
     )
     return Asset(
-        "corner", np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), normals.astype(np.float32),
-        np.zeros(len(mesh.faces), np.int32), [material], uv=random.uniform(0, 1, (len(normals), 2)).astype(np.float32),
+        "corner",
+        np.asarray(mesh.vertices, np.float32),
+        np.asarray(mesh.faces, np.int32),
+        normals.astype(np.float32),
+        np.zeros(len(mesh.faces), np.int32),
+        [material],
+        uv=random.uniform(0, 1, (len(normals), 2)).astype(np.float32),
         tangents=np.concatenate([tangents, np.ones((len(normals), 1))], axis=1).astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def textured(asset: Asset) -> TexturedSurface:
@@ -115,10 +138,14 @@ def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lam
     side = unit(torch.linalg.cross(normal, torch.tensor([1.0, 0.0, 0.0])))
     for n_dot_v in (0.95, 0.3):
         points = {
-            "positions": centre, "geometric_normals": normal, "normals": normal,
-            "view_dirs": n_dot_v * normal + math.sqrt(1 - n_dot_v**2) * side, "albedo": torch.tensor([0.2, 0.5, 1.0]),
-            "roughness": torch.tensor([roughness]), "metallic": torch.tensor([metallic]),
-        }  # fmt: skip
+            "positions": centre,
+            "geometric_normals": normal,
+            "normals": normal,
+            "view_dirs": n_dot_v * normal + math.sqrt(1 - n_dot_v**2) * side,
+            "albedo": torch.tensor([0.2, 0.5, 1.0]),
+            "roughness": torch.tensor([roughness]),
+            "metallic": torch.tensor([metallic]),
+        }
         points = {name: x.repeat(n, 1) for name, x in points.items()}
         sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
         light = incoming_light(plain_surface(ball), sky, **points, n_directions=64, seed=3)
@@ -150,10 +177,14 @@ def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_point
         maps = {name: torch.tensor(x[0, 0]).reshape(1, -1) for name, x in views[0].items()}
         assert maps["alpha"] == 1 and abs(maps["depth"] - 0.02) < 1e-4
         point = {
-            "positions": torch.tensor(position)[None], "geometric_normals": torch.tensor(geometric)[None],
-            "normals": unit(maps["normal"]), "view_dirs": torch.tensor(view)[None],
-            "albedo": maps["albedo"], "roughness": maps["roughness"], "metallic": maps["metallic"],
-        }  # fmt: skip
+            "positions": torch.tensor(position)[None],
+            "geometric_normals": torch.tensor(geometric)[None],
+            "normals": unit(maps["normal"]),
+            "view_dirs": torch.tensor(view)[None],
+            "albedo": maps["albedo"],
+            "roughness": maps["roughness"],
+            "metallic": maps["metallic"],
+        }
         radiance = torch.tensor(np.stack([v["radiance"][0, 0] for v in views]), dtype=torch.float64)
         found.append(({name: x.float() for name, x in point.items()}, *mean_and_error(radiance)))
     return found
@@ -217,7 +248,9 @@ def test_the_environment_is_seen_past_the_roof_alone():
 
 def test_nothing_arrives_from_below_the_triangle():
     """The shading normal leans by 60 degrees; a ball below the floor's plane would be seen."""
-    mesh = trimesh.util.concatenate([grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))])
+    mesh = trimesh.util.concatenate(
+        [grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))]
+    )
     points = flat_points(60) | {"normals": torch.tensor([[math.sqrt(0.75), 0.0, 0.5]]).repeat(60, 1)}
     light = incoming_light(plain_surface(mesh), WHITE, **points, n_directions=64)
     below = light.directions[..., 2] <= 0
@@ -236,8 +269,9 @@ def test_nothing_arrives_from_below_the_triangle():
 @pytest.mark.parametrize("roughness, metallic", [(0.05, 1.0), (0.5, 0.3), (1.0, 0.0)])
 def test_densities_add_up_to_the_hemisphere(roughness, metallic, lamp):
     points = flat_points(2000, 0.4) | {
-        "roughness": torch.full((2000, 1), roughness), "metallic": torch.full((2000, 1), metallic)
-    }  # fmt: skip
+        "roughness": torch.full((2000, 1), roughness),
+        "metallic": torch.full((2000, 1), metallic),
+    }
     sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
     light = incoming_light(plain_surface(grid_mesh(2.0, 1)), sky, **points, n_directions=16, seed=2)
     torch.testing.assert_close(light.directions.norm(dim=-1), torch.ones(2000, 16), rtol=0, atol=1e-6)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import generator, unit
-
 from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
 
 

@@ -8,7 +8,6 @@ import pytest
 import torch
 from op_cases import field_gradients, pixel_inputs
 from op_checks import generator, lib
-
 from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_losses, quadratic_entropy, srgb_to_linear
 
 # ---- pixels ----
@@ -96,7 +95,9 @@ def test_neighbours_at_a_right_angle_count_whatever_their_rounding(dtype):
 
 def test_normals_a_rounding_apart_know_in_which_direction():
     """The difference of such normals is rounding along themselves; its gradient must not see that."""
-    gradients = torch.tensor([[-2.1564362e-10, -2.3488480e-10, 1.51317392e-3], [-6.111313e-10, -7.259329e-10, 4.662408e-3]])
+    gradients = torch.tensor(
+        [[-2.1564362e-10, -2.3488480e-10, 1.51317392e-3], [-6.111313e-10, -7.259329e-10, 4.662408e-3]]
+    )
     found = []
     for dtype in (torch.float32, torch.float64):
         g = gradients.to(dtype).requires_grad_()

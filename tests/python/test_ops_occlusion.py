@@ -10,7 +10,6 @@ import torch
 import trimesh
 from mesh_shapes import scene_of
 from op_checks import check_error, generator, unit
-
 from splitnerf.ops import MeshScene, occlusion_factors
 
 
@@ -34,7 +33,10 @@ def sample_inputs(n: int) -> tuple:
     """Arguments of ``occlusion_factors``: points on the unit sphere that the scene's sphere is."""
     normals = unit(torch.randn(n, 3, generator=generator(1)))
     lobes = unit(normals + 0.4 * unit(torch.randn(n, 3, generator=generator(2))))
-    roughness, environment = torch.rand(n, 1, generator=generator(3)) * 0.9 + 0.1, torch.rand(8, 16, 3, generator=generator(4))
+    roughness, environment = (
+        torch.rand(n, 1, generator=generator(3)) * 0.9 + 0.1,
+        torch.rand(8, 16, 3, generator=generator(4)),
+    )
     return normals + torch.tensor([-0.9, 0.0, 0.0]), normals, lobes, roughness, environment
 
 
@@ -57,7 +59,12 @@ def test_visibility_ends_at_t_far(scene):
 
 def test_bad_meshes_raise():
     vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]])
-    for bad_vertices, bad_faces in ((vertices, faces + 1), (vertices, faces[:0]), (vertices * np.nan, faces), (vertices[:, :2], faces)):
+    for bad_vertices, bad_faces in (
+        (vertices, faces + 1),
+        (vertices, faces[:0]),
+        (vertices * np.nan, faces),
+        (vertices[:, :2], faces),
+    ):
         with pytest.raises(ValueError):
             MeshScene(bad_vertices, bad_faces)
 
@@ -70,7 +77,9 @@ def test_occlusion_agrees_with_rays_of_embreex():
     mesh = make_mesh()
     positions, normals, lobes, roughness, _ = sample_inputs(12)
     white = torch.ones(4, 8, 3)
-    got, _ = occlusion_factors(scene_of(mesh), positions, normals, lobes, roughness, white, n_diffuse_rays=4096, n_specular_rays=1)
+    got, _ = occlusion_factors(
+        scene_of(mesh), positions, normals, lobes, roughness, white, n_diffuse_rays=4096, n_specular_rays=1
+    )
     rng = np.random.default_rng(0)
     oracle = embreex_oracle(mesh)
     for x, n, o in zip(positions.numpy(), normals.numpy(), got[:, 0].numpy()):
@@ -82,11 +91,15 @@ def test_occlusion_agrees_with_rays_of_embreex():
 
 def test_seed_and_channels(scene):
     inputs = sample_inputs(60)
-    first, again, other, colours = (occlusion_factors(scene, *inputs, seed=s, n_channels=c) for s, c in ((0, 1), (0, 1), (1, 1), (0, 3)))
+    first, again, other, colours = (
+        occlusion_factors(scene, *inputs, seed=s, n_channels=c) for s, c in ((0, 1), (0, 1), (1, 1), (0, 3))
+    )
     for a, b, c, each in zip(first, again, other, colours):
         assert torch.equal(a, b) and not torch.equal(a, c) and each.shape == (60, 3)
         torch.testing.assert_close(a, each.mean(1, keepdim=True))
-    check_error(lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2")
+    check_error(
+        lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2"
+    )
 
 
 def test_rays_that_start_along_themselves():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import generator
-
 from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
 
 CPU = torch.device("cpu")
@@ -42,7 +41,9 @@ def test_rays_begin_at_their_views_centre_and_go_through_the_middles_of_pixels()
 
 def test_a_direction_is_the_matrix_times_the_point():
     matrices = torch.randn(2, 3, 3, generator=generator(), dtype=torch.float64)
-    _, rays_d, _, index = draw_rays(torch.tensor([0.1, 0.7], dtype=torch.float64), 0, EVERY, EVERY, matrices, CAMERAS[1].double(), 4, 5)
+    _, rays_d, _, index = draw_rays(
+        torch.tensor([0.1, 0.7], dtype=torch.float64), 0, EVERY, EVERY, matrices, CAMERAS[1].double(), 4, 5
+    )
     for i, view in enumerate((0, 1)):
         point = torch.tensor([index[i] % 5 + 0.5, index[i] % 20 // 5 + 0.5, 1.0], dtype=torch.float64)
         torch.testing.assert_close(rays_d[i], torch.nn.functional.normalize(matrices[view] @ point, dim=0))
@@ -59,7 +60,9 @@ def test_numbers_that_are_out_of_range_stay_within_the_photos():
 
 EXPOSURES = torch.tensor([[1.0, 2, 3], [4, 5, 6]])
 RANDOM = 0.1 * torch.arange(12.0).view(4, 3)
-EDGES = EdgeRuns(torch.tensor([2, 6]), torch.tensor([3, 8]), torch.tensor([-2, -5]), torch.arange(9, dtype=torch.uint8).view(3, 3))
+EDGES = EdgeRuns(
+    torch.tensor([2, 6]), torch.tensor([3, 8]), torch.tensor([-2, -5]), torch.arange(9, dtype=torch.uint8).view(3, 3)
+)
 
 
 def read(codes: torch.Tensor, pixels: list[int], edges: EdgeRuns = EDGES):

@@ -6,7 +6,6 @@ import pytest
 import torch
 from op_checks import check_error, generator, lib
 from ray_inputs import composite_inputs, packed_samples, surface_case, surface_inputs
-
 from splitnerf.ops import PackedSamples, composite, spread_samples, surface_weights
 
 # ---- surface_weights ----
@@ -71,7 +70,9 @@ def test_spread_draws_all_and_names_the_heaviest():
     weights, samples, phase = packed_samples()
     spread = spread_samples(weights, samples, 0, phase)
     n = len(weights)
-    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(spread.interpolate(weights[:, None])[:, 0], weights)
+    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(
+        spread.interpolate(weights[:, None])[:, 0], weights
+    )
     for per_ray in (0, 2):
         spread = spread_samples(weights, samples, per_ray, phase)
         rays = samples.ray_indices[spread.shaded]
@@ -128,7 +129,9 @@ def test_too_little_room_is_told_and_indices_stay_in_range():
         assert spread.sizes.tolist() == [n_shaded, 49, n_stretches]
         assert spread.interpolate(weights.new_ones(room[0], 1)).eq(1).all() and spread.stretch.max() < room[1]
         assert max(spread.leaders.max(), spread.heaviest.max()) < room[0] and spread.shaded.max() < len(weights)
-    check_error(lambda: lib.spread_samples(weights, samples.middles, samples.offsets, phase, 0.3, 2, 5), "max_stretches")
+    check_error(
+        lambda: lib.spread_samples(weights, samples.middles, samples.offsets, phase, 0.3, 2, 5), "max_stretches"
+    )
 
 
 def test_spread_draws_in_proportion_to_the_weights():

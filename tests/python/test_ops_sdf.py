@@ -8,7 +8,6 @@ import pytest
 import torch
 from op_cases import BOX, SDF_SPEC, STEP, bumpy_field, field_rays, full_cells, sampling_settings, sdf_field_inputs
 from op_checks import generator, grad_leaves, lib
-
 from splitnerf.ops import CELL_EMPTY, SdfNetwork, march_rays, sample_rays, sdf_values, surface_weights
 
 
@@ -121,7 +120,9 @@ def left_out(field, s: float, anneal: float = 1.0, lipschitz: float = 1.25) -> t
     at = o[samples.ray_indices] + d[samples.ray_indices] * (0.5 * (samples.t_starts + samples.t_ends))[:, None]
     there = field.sample(at)
     sharp = torch.tensor(s, dtype=torch.float64)
-    _, weights, _ = surface_weights(there.sdf.detach(), there.gradient.detach(), d, sharp, samples.offsets, step=STEP, anneal=anneal)
+    _, weights, _ = surface_weights(
+        there.sdf.detach(), there.gradient.detach(), d, sharp, samples.offsets, step=STEP, anneal=anneal
+    )
     kept, _, _ = sampled(field, (o, d, jitter), s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s, lipschitz=lipschitz)
     lattice = lambda some: some.ray_indices * 100000 + (some.t_starts / STEP * 8).round().long()  # noqa: E731
     faint = torch.where(torch.isin(lattice(samples), lattice(kept)), 0.0, weights)
@@ -156,7 +157,9 @@ def test_a_field_far_steeper_than_promised_costs_few_distances():
     o, d = torch.zeros(7, 3, dtype=torch.float64), torch.zeros(7, 3, dtype=torch.float64)
     o[:, 0], o[:, 2], d[:, 2] = torch.linspace(-1, 1, 7), 0.6, -1.0
     jitter = torch.linspace(0, 0.9, 7, dtype=torch.float64)
-    kept, evaluated, _ = sampled(plane, (o, d, jitter), step=0.005, s=1000.0, min_weight=1e-3, min_transmittance=1e-3, reach=0.007)
+    kept, evaluated, _ = sampled(
+        plane, (o, d, jitter), step=0.005, s=1000.0, min_weight=1e-3, min_transmittance=1e-3, reach=0.007
+    )
     z = 0.6 - 0.5 * (kept.t_starts + kept.t_ends)
     assert torch.equal(kept.ray_indices.unique(), torch.arange(7))
     assert (z + 0.2).abs().max() < 0.01
@@ -219,7 +222,9 @@ def gradients(function, inputs: tuple) -> tuple[tuple, list[torch.Tensor]]:
     """The outputs, and the gradients of a sum with drawn weights."""
     leaves = grad_leaves(inputs, LEARNED)
     outputs = function(*leaves)
-    total = sum((torch.randn(x.shape, generator=generator(i), dtype=torch.float64) * x).sum() for i, x in enumerate(outputs))
+    total = sum(
+        (torch.randn(x.shape, generator=generator(i), dtype=torch.float64) * x).sum() for i, x in enumerate(outputs)
+    )
     return outputs, list(torch.autograd.grad(total, leaves[1:8]))
 
 

@@ -10,10 +10,17 @@ from op_cases import drawn_inputs, shared_inputs
 from op_checks import check_error, lib, unit
 from reference import drawn_directions
 from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
-
 from splitnerf.ops import (
-    LightSums, brdf_lut, light_queries, monte_carlo_light, shade_sums, shading, split_sum_shade, summed_correction, summed_light,
-)  # fmt: skip
+    LightSums,
+    brdf_lut,
+    light_queries,
+    monte_carlo_light,
+    shade_sums,
+    shading,
+    split_sum_shade,
+    summed_correction,
+    summed_light,
+)
 
 # ---- the split sum ----
 
@@ -37,15 +44,25 @@ def test_table_made_in_inference_mode_serves_training():
 
 def test_an_option_that_is_not_known_is_named():
     inputs = split_sum_inputs("cpu", torch.float32)
-    check_error(lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast")
-    check_error(lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median"), "light_queries", "query", "mean", "median")
+    check_error(
+        lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast"
+    )
+    check_error(
+        lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median"),
+        "light_queries",
+        "query",
+        "mean",
+        "median",
+    )
 
 
 @pytest.mark.parametrize("compensate", [False, True])
 def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
     """F1 + F2 is 1 but for a millionth there, and the gradient to roughness is the change of that millionth."""
     normals, view_dirs = (unit(torch.tensor([x])) for x in ([0.887, -0.036, -0.460], [-0.849, 0.157, 0.504]))
-    rest = [torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])]
+    rest = [
+        torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])
+    ]
     found = []
     for dtype in (torch.float32, torch.float64):
         inputs = [x.to(dtype) for x in (normals, view_dirs, *rest)]
@@ -106,7 +123,9 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
         return split_sum_shade(normals, view_dirs, albedo, roughness, metallic, one, black, one, one)
 
     sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
-    there = split_sum_shade(normals, view_dirs, albedo, roughness, metallic, light, diffuse, one, one, "exact", compensate)
+    there = split_sum_shade(
+        normals, view_dirs, albedo, roughness, metallic, light, diffuse, one, one, "exact", compensate
+    )
     torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, compensate), there)
 
 
@@ -128,6 +147,8 @@ def test_a_sum_of_another_shape_is_named():
 def test_the_correction_is_the_sum_less_the_split_by_its_share():
     normals, view_dirs, roughness, *light = shared_inputs(12)
     albedo, metallic, split, share = (torch.rand(12, *k, dtype=torch.float64) for k in ((3,), (1,), (3,), ()))
-    summed = shade_sums(normals, view_dirs, albedo, roughness, metallic, summed_light(normals, view_dirs, roughness, *light), True)
+    summed = shade_sums(
+        normals, view_dirs, albedo, roughness, metallic, summed_light(normals, view_dirs, roughness, *light), True
+    )
     found = summed_correction(normals, view_dirs, albedo, roughness, metallic, split, share, *light, compensate=True)
     torch.testing.assert_close(found, (summed - split) * share[:, None])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 from painted_ball import PHOTO, photos, sky, textured
-
 from splitnerf.refinement import outline
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
@@ -65,7 +64,9 @@ def test_a_piece_moves_as_its_edge_does_in_the_image(painted):
                     a, b = image(moved)[ends]
                     t = ((point - a) @ (b - a)) / ((b - a) @ (b - a))
                     offsets.append((a + t * (b - a) - point) @ outward)
-                assert by_axis[axis] == pytest.approx((offsets[1] - offsets[0]) / 2e-4, abs=1e-3 * np.abs(pieces.moves).max())
+                assert by_axis[axis] == pytest.approx(
+                    (offsets[1] - offsets[0]) / 2e-4, abs=1e-3 * np.abs(pieces.moves).max()
+                )
 
 
 def test_what_is_behind_the_camera_or_beside_the_photo_has_no_outline(painted):

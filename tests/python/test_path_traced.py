@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from splitnerf import _core
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import read_environment
@@ -72,7 +71,9 @@ def test_wide_filter_blurs_the_outline_and_keeps_the_area():
         )
     partial = {name: ((m["alpha"] > 0.001) & (m["alpha"] < 0.999)).sum() for name, m in maps.items()}
     assert partial["blackman-harris"] > partial["box"]
-    default = AssetRenderer(square(Material())).render(np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024)
+    default = AssetRenderer(square(Material())).render(
+        np.ones((4, 8, 3), np.float32), camera, lens, SIZE, SIZE, spp=1024
+    )
     np.testing.assert_array_equal(default["alpha"], maps["blackman-harris"]["alpha"])
     assert maps["blackman-harris"]["alpha"].sum() == pytest.approx(maps["box"]["alpha"].sum(), rel=2e-3)
 
@@ -93,7 +94,9 @@ def test_a_camera_stands_as_its_pose_says():
     asset = square(Material())
     asset.vertices[:, 0] += 0.5
     pose = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 4.0]])
-    maps = AssetRenderer(asset).render(np.ones((4, 8, 3), np.float32), pose, (16.0, 16.0, 8, 8), 16, 16, spp=4, pixel_filter="box")
+    maps = AssetRenderer(asset).render(
+        np.ones((4, 8, 3), np.float32), pose, (16.0, 16.0, 8, 8), 16, 16, spp=4, pixel_filter="box"
+    )
     expected = np.zeros((16, 16), np.float32)
     expected[6:14, 4:12] = 1
     np.testing.assert_array_equal(maps["alpha"], expected)
@@ -171,9 +174,13 @@ def test_looks_as_in_blender(scene, least):
     height, width = truth.shape[:2]
     focal = 0.5 * width / np.tan(0.5 * meta["camera_angle_x"])
     maps = AssetRenderer(read_asset(folder / "asset.glb")).render(
-        read_environment(folder / "relight_sunset.hdr"), np.array(meta["frames"][0]["transform_matrix"]),
-        (focal, focal, width / 2, height / 2), width, height, spp=64,
-    )  # fmt: skip
+        read_environment(folder / "relight_sunset.hdr"),
+        np.array(meta["frames"][0]["transform_matrix"]),
+        (focal, focal, width / 2, height / 2),
+        width,
+        height,
+        spp=64,
+    )
     straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-8)[..., None]
     image = over_background(np.clip(linear_to_srgb(straight), 0, 1), maps["alpha"])
     assert psnr(image, over_background(truth[..., :3], truth[..., 3])) > least

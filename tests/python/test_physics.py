@@ -8,18 +8,19 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from torch.nn import functional as F
-
 from splitnerf.config import Config
 from splitnerf.fields import LightPyramid
 from splitnerf.training import losses
+from torch.nn import functional as F
 
 
 def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
     return SimpleNamespace(
-        weights=torch.tensor(weights), shares=torch.tensor(weights), shaded=torch.arange(len(weights)),
+        weights=torch.tensor(weights),
+        shares=torch.tensor(weights),
+        shaded=torch.arange(len(weights)),
         points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
-    )  # fmt: skip
+    )
 
 
 def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
@@ -98,13 +99,14 @@ def entropy(albedo: list[float], weights: list[float] | None = None, roughness: 
     n = len(albedo)
     config = Config().replace({"entropy_points": 4000, "albedo_width": 0.3, "gloss_width": 0.2})
     ray = SimpleNamespace(
-        shares=torch.tensor(weights or [1.0] * n).repeat(2000), shaded=torch.arange(2000 * n),
+        shares=torch.tensor(weights or [1.0] * n).repeat(2000),
+        shaded=torch.arange(2000 * n),
         points=SimpleNamespace(
             albedo=torch.tensor(albedo)[:, None].expand(-1, 3).repeat(2000, 1),
             roughness=torch.tensor(roughness or [0.5] * n)[:, None].repeat(2000, 1),
             metallic=torch.zeros(2000 * n, 1),
         ),
-    )  # fmt: skip
+    )
     return losses.material_entropy_loss(ray, config, torch.Generator().manual_seed(0)).item()
 
 

@@ -10,7 +10,6 @@ import torch
 from blender_data import look_at
 from op_checks import generator
 from precision import precisions
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.render.rays import PixelSource, image_rays
 

@@ -7,13 +7,12 @@ from importlib.metadata import EntryPoint
 from types import ModuleType, SimpleNamespace
 
 import pytest
-from tiny_runs import train
-
 from splitnerf import plugins
 from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser
 from splitnerf.plugins import Plugin, installed
 from splitnerf.run_folder import is_finished
 from splitnerf_tools.plugin import PLUGIN
+from tiny_runs import train
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import io
 import signal
 
 import pytest
-
 from splitnerf import progress
 from splitnerf.progress import Interrupt, Progress
 

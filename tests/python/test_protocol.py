@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.truth import ViewTruth
@@ -85,7 +84,9 @@ def test_albedos_stand_on_white_by_their_own_coverage():
 def test_the_light_is_scaled_to_the_truth_and_judged_by_the_truths_white():
     light, truth = np.full((16, 32, 3), 0.7), np.full((16, 32, 3), 0.5)
     light[4:7, 8:12], truth[5:9, 20:22] = 9.0, 30.0
-    found = evaluate_maps([{"alpha": np.ones((SIZE, SIZE))}], dataset(picture(0.5, 1.0)), [ViewTruth("a")], light, truth)
+    found = evaluate_maps(
+        [{"alpha": np.ones((SIZE, SIZE))}], dataset(picture(0.5, 1.0)), [ViewTruth("a")], light, truth
+    )
     assert found["light_psnr"] == pytest.approx(metrics.light_psnr(light, truth))
     assert abs(found["light_psnr"] - metrics.light_psnr(truth, light)) > 0.5
 
@@ -94,7 +95,10 @@ def test_the_distance_is_asked_for_views_and_for_albedo():
     truth = ViewTruth("a", albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
     prediction = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
     scores = evaluate_maps(
-        [prediction], dataset(picture(0.5, 1.0)), [truth], distance=lambda image, truth: 0.25 + image.mean() - truth.mean()
+        [prediction],
+        dataset(picture(0.5, 1.0)),
+        [truth],
+        distance=lambda image, truth: 0.25 + image.mean() - truth.mean(),
     )
     assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.35, 0.25], abs=1e-5)
 
@@ -106,7 +110,10 @@ def test_a_prediction_is_clipped_before_it_is_scored():
 
 def test_structure_is_compared_with_the_truths():
     image, truth = np.random.default_rng(0).random((2, 16, 16, 3))
-    assert image_scores(image, truth)["ssim"] == pytest.approx(metrics.ssim(image, truth)) and metrics.ssim(image, truth) < 0.5
+    assert (
+        image_scores(image, truth)["ssim"] == pytest.approx(metrics.ssim(image, truth))
+        and metrics.ssim(image, truth) < 0.5
+    )
 
 
 def test_scores_of_views_are_averaged():

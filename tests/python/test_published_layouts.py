@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, patches, write_object, write_set
 from scipy.spatial.transform import Rotation
-
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import directions_of_texels, turn_environment
@@ -16,8 +15,8 @@ from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.images import read_radiance, write_image
 from splitnerf.data.layouts import neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.layouts.lit import read_lit_photo
+from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import load_photo
 from splitnerf.data.reading import Reading
 from splitnerf.data.relit import map_files
@@ -26,9 +25,12 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 
 SETS = {  # the module that reads it, and whether it has photos in other lights
-    "stanford-orb": (stanford_orb, True), "nerfactor": (view_folders, True), "tensoir": (view_folders, True),
-    "shiny": (transforms, False), "neus": (neus, False),
-}  # fmt: skip
+    "stanford-orb": (stanford_orb, True),
+    "nerfactor": (view_folders, True),
+    "tensoir": (view_folders, True),
+    "shiny": (transforms, False),
+    "neus": (neus, False),
+}
 RANDOM = np.random.default_rng(11)
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
@@ -67,7 +69,11 @@ def test_the_truth_from_each_camera_looks_like_the_photo(written):
         right = scene.render(light, frame.pose)
         assert fits(frame, right) > worst, fits(frame, right)
         assert fits(frame, {"radiance": right["radiance"][:, ::-1]}) < worst - 6
-    for wrong in (frame.pose @ np.diag([1.0, -1, -1, 1]), frame.pose @ np.diag([-1.0, -1, 1, 1]), np.linalg.inv(frame.pose)):
+    for wrong in (
+        frame.pose @ np.diag([1.0, -1, -1, 1]),
+        frame.pose @ np.diag([-1.0, -1, 1, 1]),
+        np.linalg.inv(frame.pose),
+    ):
         assert fits(frame, scene.render(light, wrong, 16)) < worst - 6
 
 
@@ -127,7 +133,12 @@ def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, 
     (root / "train_mask").mkdir(parents=True)
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
-    frame = {"scene_name": "cup_scene004", "file_path": "test/0003", "camera_angle_x": 0.4, "transform_matrix": pose.tolist()}
+    frame = {
+        "scene_name": "cup_scene004",
+        "file_path": "test/0003",
+        "camera_angle_x": 0.4,
+        "transform_matrix": pose.tolist(),
+    }
     for name in ("train", "novel"):
         (root / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
     write_image(root.with_name("cup_scene004") / "test/0003.exr", np.ones((8, 8, 3), np.float32))
@@ -157,6 +168,16 @@ def test_radiance_a_little_below_0_is_noise(tmp_path):
 def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
     write_image(tmp_path / "a.exr", patches())
     map_path = str(tmp_path / "a.exr")
-    arguments = [str(write_object(tmp_path)), "--light", map_path, "--relight", map_path, "--out", str(tmp_path / "out")]
+    arguments = [
+        str(write_object(tmp_path)),
+        "--light",
+        map_path,
+        "--relight",
+        map_path,
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main(["synth", *arguments, "--layout", "neus"]) == BAD_INPUT
-    assert "the layout neus has no images in other lights" in capsys.readouterr().err and not (tmp_path / "out").exists()
+    assert (
+        "the layout neus has no images in other lights" in capsys.readouterr().err and not (tmp_path / "out").exists()
+    )

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.layouts.frame import Frame
@@ -23,7 +22,9 @@ class Painted:
     """An asset whose pictures are given by the test."""
 
     environment = LIGHT
-    asset = Asset("a", np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.eye(3, dtype=np.float32), np.zeros(1, np.int32))
+    asset = Asset(
+        "a", np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.eye(3, dtype=np.float32), np.zeros(1, np.int32)
+    )
     vertices = 10 * np.eye(3)
 
     def __init__(self, image: np.ndarray):

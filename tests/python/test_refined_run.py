@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 import torch
 from painted_ball import sky, with_textures
-from tiny_runs import train
-
 from splitnerf import pipeline, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.summary import print_refinement
@@ -31,6 +29,7 @@ from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
 from splitnerf.refinement.job import OtherState, refine_folder
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf_tools.report.sections import refinement_section
+from tiny_runs import train
 
 REFINED = ("--set", "refinement.enabled=true", "--set", "refinement_sweeps=2")
 DELIVERED = ("mesh.glb", "environment.exr", "environment.hdr", "refinement.json")
@@ -56,7 +55,9 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
     assert all((run / name).stat().st_size > 0 for name in (*DELIVERED, "mesh.ply", "evaluation.json", "report.html"))
     assert not (run / "refinement.pt").exists()
     fitted, trained = read_asset(run / "mesh.glb"), read_asset(run / "trained" / "mesh.glb")
-    assert np.array_equal(fitted.triangles, trained.triangles) and not np.allclose(fitted.vertices, trained.vertices, atol=1e-5)
+    assert np.array_equal(fitted.triangles, trained.triangles) and not np.allclose(
+        fitted.vertices, trained.vertices, atol=1e-5
+    )
     assert not np.array_equal(*(read_image(folder / "environment.exr") for folder in (run, run / "trained")))
 
 
@@ -150,7 +151,9 @@ def stop_after(monkeypatch, sweeps: int) -> None:
     monkeypatch.setattr(Stage, "advance", counted)
 
 
-def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_another(run, data, tmp_path, capsys, monkeypatch):
+def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_another(
+    run, data, tmp_path, capsys, monkeypatch
+):
     halves = tmp_path / "halves"
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
@@ -276,10 +279,15 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
     refused("settings", dataclasses.replace(QUICK, light_step=1.0))
     content = read_tensors(folder / "refinement.pt")
     for broken in (
-        {"vertices": content["vertices"][1:]}, {"vertices": np.nan * content["vertices"]}, {"sweeps": [[1.0]]}, {"outline": [None]},
-        {"fit": content["fit"] | {"light": content["fit"]["light"][1:]}}, {"fit": content["fit"] | {"random": {}}},
-        {"fit": content["fit"] | {"unknowns": content["fit"]["unknowns"][1:]}}, {"fit": None},
-    ):  # fmt: skip
+        {"vertices": content["vertices"][1:]},
+        {"vertices": np.nan * content["vertices"]},
+        {"sweeps": [[1.0]]},
+        {"outline": [None]},
+        {"fit": content["fit"] | {"light": content["fit"]["light"][1:]}},
+        {"fit": content["fit"] | {"random": {}}},
+        {"fit": content["fit"] | {"unknowns": content["fit"]["unknowns"][1:]}},
+        {"fit": None},
+    ):
         torch.save(content | broken, folder / "refinement.pt")
         refused("not the state")
     (folder / "refinement.pt").write_bytes(state[:1000])
@@ -300,7 +308,10 @@ def test_refine_can_be_interrupted_and_goes_on(run, data, tmp_path, monkeypatch,
         assert main(command) == INTERRUPTED
     assert "--resume" in capsys.readouterr().out
     assert main([*command, "--resume"]) == DONE
-    assert bytes_of(run / "refined", "mesh.glb") == bytes_of(run, "mesh.glb") and not (run / "refined" / "refinement.pt").exists()
+    assert (
+        bytes_of(run / "refined", "mesh.glb") == bytes_of(run, "mesh.glb")
+        and not (run / "refined" / "refinement.pt").exists()
+    )
 
 
 def test_time_ends_a_stage_by_its_minutes(painted):
@@ -416,7 +427,7 @@ def test_the_reports_numbers_are_those_of_its_pictures():
         "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1]}],
         "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125},
         "lights": [np.ones((4, 8, 3))] * 2,
-    }  # fmt: skip
+    }
     section = refinement_section(page)
     assert section["rows"][0][1:] == ("20.00 dB", "40.00 dB") and section["rows"][2][1:] == ("0.2", "0.1")
     assert section["saturated"] == "12.5 %" and len(section["views"][0]["cells"]) == 3

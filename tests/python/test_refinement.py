@@ -9,7 +9,6 @@ import pytest
 import torch
 import trimesh
 from painted_ball import FOCAL, SIZE, heights, looking, photos, sky, textured, with_textures
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
@@ -42,7 +41,9 @@ def test_unknowns_stand_for_the_values_within_their_ranges():
 def test_the_filter_has_the_windows_moments():
     offsets = PixelFilter().draw(200_000, np.random.default_rng(0))
     t = np.linspace(0, 1, 10001)
-    window = 0.35875 - 0.48829 * np.cos(2 * np.pi * t) + 0.14128 * np.cos(4 * np.pi * t) - 0.01168 * np.cos(6 * np.pi * t)
+    window = (
+        0.35875 - 0.48829 * np.cos(2 * np.pi * t) + 0.14128 * np.cos(4 * np.pi * t) - 0.01168 * np.cos(6 * np.pi * t)
+    )
     variance = 9 * np.average((t - 0.5) ** 2, weights=window)
     assert np.abs(offsets.mean(0)).max() < 0.005
     np.testing.assert_allclose(offsets.var(0), variance, rtol=0.02)
@@ -54,16 +55,21 @@ def test_points_read_what_the_path_tracer_reads(ball):
     random = np.random.default_rng(1)
     tilted = random.normal(size=(SIZE, SIZE, 3)) * 0.3 + [0, 0, 1]
     asset = with_textures(
-        ball, albedo_texture=random.random((SIZE, SIZE, 3), np.float32),
+        ball,
+        albedo_texture=random.random((SIZE, SIZE, 3), np.float32),
         roughness_metallic_texture=random.random((SIZE, SIZE, 2), np.float32),
         normal_texture=(tilted / np.linalg.norm(tilted, axis=2, keepdims=True)).astype(np.float32),
-    )  # fmt: skip
+    )
     pose, n = looking(0.3, 0.4), 16
     many = AssetRenderer(asset).render(
         sky(), pose, (FOCAL, FOCAL, n / 2, n / 2), n, n, spp=1024, pixel_filter="box", bounces=0
     )
-    data = replace(photos(ball, sky(), 1, 1), poses=pose[None], intrinsics=np.float32([[FOCAL, FOCAL, n / 2, n / 2]]),
-                   images=np.ones((1, n, n, 4), np.float32))  # fmt: skip
+    data = replace(
+        photos(ball, sky(), 1, 1),
+        poses=pose[None],
+        intrinsics=np.float32([[FOCAL, FOCAL, n / 2, n / 2]]),
+        images=np.ones((1, n, n, 4), np.float32),
+    )
     pixels, texels = covered_pixels(data), AssetTexels(asset)
     inside = np.flatnonzero(many["alpha"].reshape(-1) == 1)
     offsets = np.stack(np.meshgrid(*[(np.arange(32) + 0.5) / 32 - 0.5] * 2), axis=-1).reshape(1, -1, 2)
@@ -71,8 +77,16 @@ def test_points_read_what_the_path_tracer_reads(ball):
     fit = Refinement(data, asset, sky(), RefinementSettings())
     triangle, u, v = fit.scene.trace_closest(origins.reshape(-1, 3), directions.reshape(-1, 3))
     samples = texels.sample(triangle, u, v, -directions.reshape(-1, 3))
-    values = torch.from_numpy(np.concatenate([asset.materials[0].albedo_texture, asset.materials[0].roughness_metallic_texture,
-                                              asset.materials[0].normal_texture], 2)).view(-1, 8)  # fmt: skip
+    values = torch.from_numpy(
+        np.concatenate(
+            [
+                asset.materials[0].albedo_texture,
+                asset.materials[0].roughness_metallic_texture,
+                asset.materials[0].normal_texture,
+            ],
+            2,
+        )
+    ).view(-1, 8)
     read = (values[samples.footprints.texels] * samples.footprints.weights[..., None]).sum(1)
     found = torch.cat(list(materials_of(read, samples)), 1).view(len(inside), -1, 8).mean(1).numpy()
     names = ("albedo", "roughness", "metallic", "normal")
@@ -89,8 +103,11 @@ def cornered() -> tuple[Asset, Dataset]:
     plate.apply_translation([0, 0, -0.15])
     both = trimesh.util.concatenate([ball, plate])
     gloss = np.tile(np.float32([0.8, 1.0]), (SIZE, SIZE, 1))
-    asset = with_textures(textured(both.vertices, both.faces), roughness_metallic_texture=gloss,
-                          albedo_texture=np.full((SIZE, SIZE, 3), 0.9, np.float32))  # fmt: skip
+    asset = with_textures(
+        textured(both.vertices, both.faces),
+        roughness_metallic_texture=gloss,
+        albedo_texture=np.full((SIZE, SIZE, 3), 0.9, np.float32),
+    )
     return asset, photos(asset, 0.4 * sky(), n=6, spp=256)
 
 
@@ -220,10 +237,12 @@ def test_fitted_heights(height, fitted):
 
 def test_an_asset_of_another_form_is_refused(ball):
     for wrong in (
-        replace(ball, uv=None), replace(ball, materials=ball.materials * 2),
-        with_textures(ball, normal_texture=None), with_textures(ball, albedo_texture=np.ones((8, 8, 3), np.float32)),
+        replace(ball, uv=None),
+        replace(ball, materials=ball.materials * 2),
+        with_textures(ball, normal_texture=None),
+        with_textures(ball, albedo_texture=np.ones((8, 8, 3), np.float32)),
         replace(ball, materials=[replace(ball.materials[0], roughness=0.5)]),
-    ):  # fmt: skip
+    ):
         with pytest.raises(ValueError, match="asset"):
             AssetTexels(wrong)
 

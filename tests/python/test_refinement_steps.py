@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from painted_ball import sky
-
+from reference import drawn_directions
 from splitnerf import _core
 from splitnerf.data.environment import sample_environment
 from splitnerf.ops import monte_carlo_light
@@ -14,10 +14,9 @@ from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
+from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
-from reference import drawn_directions
 
 
 def chain(**weights: float) -> Prior:
@@ -104,7 +103,9 @@ def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    assert torch.isfinite(usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()  # one colour
+    assert torch.isfinite(
+        usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]
+    ).all()  # one colour
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
@@ -122,7 +123,9 @@ def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
     positions[~of_gold.numpy()] += [0.7, 0, 0]
     found = usual_gloss(unknowns, unknowns, positions, 0)[:, 4]
     assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
-    assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()  # the colour alone takes all
+    assert (
+        usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9
+    ).all()  # the colour alone takes all
 
 
 def test_metal_does_not_spread_by_what_it_turned_into_metal():
@@ -212,7 +215,9 @@ def test_a_light_is_what_it_was_made_from_and_is_read_as_the_tracer_reads_it():
     np.testing.assert_allclose(raised[:, -1], raised[:, 2], rtol=1e-4)  # over the seam as on its other side
 
 
-def observed_light(truth: torch.Tensor, start: torch.Tensor, directions: torch.Tensor, n_steps: int = 20, share: float = 0.5) -> torch.Tensor:
+def observed_light(
+    truth: torch.Tensor, start: torch.Tensor, directions: torch.Tensor, n_steps: int = 20, share: float = 0.5
+) -> torch.Tensor:
     """The light that is found where n rays see the mean of their k directions' radiance, without noise."""
     light = EnvironmentLight(start)
     equations = LightEquations(light, share_of_rows=1.0)
@@ -262,7 +267,9 @@ def test_the_lights_curvature_is_that_of_the_errors():
 
 def test_white_integrals_are_those_of_many_directions():
     """Values and derivatives by normal and roughness, against sums over 65,536 directions of the sphere in float64."""
-    normals = torch.nn.functional.normalize(torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [-0.6, 0.2, 0.7]]).double(), dim=1)
+    normals = torch.nn.functional.normalize(
+        torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [-0.6, 0.2, 0.7]]).double(), dim=1
+    )
     view = torch.nn.functional.normalize(torch.tensor([[0.5, 0.2, 1.0]]).double(), dim=1).expand(3, 3).contiguous()
     point = normals.requires_grad_(True), torch.tensor([[0.3], [0.6], [0.9]]).double().requires_grad_(True)
     tilt = (view - normals * (normals * view).sum(1, keepdim=True)).detach()  # a normal keeps its length
@@ -291,7 +298,12 @@ def test_centred_derivatives_say_the_same_with_less_noise():
     plain, of_one = monte_carlo_light(*drawn, light), monte_carlo_light(*drawn, torch.ones_like(light))
     white = white_sums(normals, view, roughness)
     calm, still = centred(plain, of_one, white), centred(of_one, of_one, white)
-    for name, unknown in (("specular", normals), ("diffuse", normals), ("specular", roughness), ("dielectric", roughness)):
+    for name, unknown in (
+        ("specular", normals),
+        ("diffuse", normals),
+        ("specular", roughness),
+        ("dielectric", roughness),
+    ):
         torch.testing.assert_close(getattr(calm, name), getattr(plain, name), rtol=0, atol=0)
         of_plain, of_calm, of_still = (
             torch.autograd.grad(getattr(sums, name)[:, 0].sum(), unknown, retain_graph=True)[0][:, 0]
@@ -309,7 +321,9 @@ def test_the_light_moves_to_what_photos_show():
     light = EnvironmentLight(torch.full((16, 32, 3), 0.6))
     equations = LightEquations(light, share_of_rows=1.0, surroundings=surroundings)
     for _ in range(12):
-        texels, shares = footprints(16, torch.nn.functional.normalize(torch.randn(40, 3, generator=torch.Generator().manual_seed(0)), dim=1))
+        texels, shares = footprints(
+            16, torch.nn.functional.normalize(torch.randn(40, 3, generator=torch.Generator().manual_seed(0)), dim=1)
+        )
         slopes = torch.full((40, 1, 3), 1e-6)
         equations.add(Rows(texels, shares, slopes, torch.ones(40, 3)), torch.full((40, 1, 3), 0.6), torch.zeros(40, 3))
         equations.step(1.0)

@@ -10,22 +10,21 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from test_train import flat, same
-from tiny_runs import lines_of, tiny
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, VisibilityBits
+from splitnerf.pipeline import load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged
-from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.metrics import StepLog
+from splitnerf.training.schedule import next_ray_count
 from splitnerf.training.step import Capacity, StepNumbers
-from splitnerf.pipeline import load_run
+from test_train import flat, same
+from tiny_runs import lines_of, tiny
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
@@ -63,7 +62,7 @@ def refreshed(data, tmp_path, monkeypatch):
         seen = {
             "grid": calls(monkeypatch, OccupancyGrid, "update", lambda _, *args, **settings: (at[0], settings)),
             "backward": calls(monkeypatch, EvaluatedLight, "backward", lambda *_: at[0]),
-        }  # fmt: skip
+        }
         config = tiny(steps=20, **PLAIN, **settings)
         return loop.train(load_dataset(data), config, tmp_path), seen
 
@@ -108,7 +107,11 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
 
     monkeypatch.setattr(loop.Training, "__init__", noted)
     config = tiny(
-        steps=20, mesh_every=0.2, preview_every=2.0, **{"occlusion.kind": "mlp", "shading.method": "split", "constants.occlusion_environment_height": 12}, occlusion_rays=4
+        steps=20,
+        mesh_every=0.2,
+        preview_every=2.0,
+        **{"occlusion.kind": "mlp", "shading.method": "split", "constants.occlusion_environment_height": 12},
+        occlusion_rays=4,
     )
     loop.train(load_dataset(data), config, tmp_path)
     assert heights == [(4, 12), (16, 12)] and training["it"].environment.shape == (12, 24, 3)
@@ -168,7 +171,12 @@ def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
 def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(tmp_path):
     """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; and the steps that were skipped."""
     log = StepLog(tmp_path)
-    log.take(StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600), 3.0, 0.5, skipped=5)
+    log.take(
+        StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600),
+        3.0,
+        0.5,
+        skipped=5,
+    )
     line = log.pending
     counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}
     expected = counts | {"loss": 0.5, "loss_colour": 0.5}
@@ -253,7 +261,10 @@ def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path)
 def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     """In a run of another seed; of a mesh that is lit, and of numbers that no other run has. The rates are those of the
     settings."""
-    dataset, config = load_dataset(data), tiny(steps=8, mesh_every=2.0, preview_every=2.0, open_below=0.0, levels_open_by=0.0)
+    dataset, config = (
+        load_dataset(data),
+        tiny(steps=8, mesh_every=2.0, preview_every=2.0, open_below=0.0, levels_open_by=0.0),
+    )
     finished = calls(monkeypatch, loop.Training, "finish", lambda self: self)
     loop.train(dataset, config, tmp_path)
     one, other = finished[0], loop.Training(dataset, config.replace({"seed": 8}), tmp_path, torch.device("cpu"))
@@ -307,8 +318,14 @@ def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch
     assert (used[0] == 6) == deterministic and used[-1] == 11
 
 
-@pytest.mark.parametrize("settings", [{}, {"occlusion.kind": "off", "shading.method": "split"},
-                                      {"occlusion.kind": "mlp", "shading.method": "split", "occlusion_weight": 0.0}])  # fmt: skip
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"occlusion.kind": "off", "shading.method": "split"},
+        {"occlusion.kind": "mlp", "shading.method": "split", "occlusion_weight": 0.0},
+    ],
+)
 def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, settings):
     loop.train(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
     assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
@@ -318,7 +335,9 @@ def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, setting
 def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, occlusion, asked):
     """The last one is for the bits: they are stored with it."""
     requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
-    config = tiny(steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": occlusion, "shading.method": "split"})
+    config = tiny(
+        steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": occlusion, "shading.method": "split"}
+    )
     loop.train(load_dataset(data), config, tmp_path)
     assert requests == asked
 

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 import torch
 from gltf_builder import triangle
-from tiny_runs import train
-from torch.autograd import forward_ad
-
 from splitnerf import ops
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
+from tiny_runs import train
+from torch.autograd import forward_ad
 
 
 @pytest.fixture
@@ -86,10 +85,13 @@ def test_a_map_without_a_name_has_no_folder_of_its_own(tmp_path, asset, grey, ca
     assert not (tmp_path / "a").exists()
 
 
-@pytest.mark.parametrize(("path", "message"), [
-    ({"w": 0.5, "h": 0.5}, "'w' and 'h' must lie between 1 and 16384, got 0 and 0"),
-    ({"w": 1e9, "h": 1e9}, "'w' and 'h' must lie between 1 and 16384"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ({"w": 0.5, "h": 0.5}, "'w' and 'h' must lie between 1 and 16384, got 0 and 0"),
+        ({"w": 1e9, "h": 1e9}, "'w' and 'h' must lie between 1 and 16384"),
+    ],
+)
 def test_pictures_of_no_size_or_without_end(tmp_path, asset, grey, capsys, path, message):
     frames = [{"transform_matrix": np.eye(4).tolist()}]
     (tmp_path / "path.json").write_text(json.dumps(path | {"camera_angle_x": 1.0, "frames": frames}))
@@ -150,10 +152,17 @@ def test_scores_of_another_run_are_not_replaced(data, other_data, tmp_path, caps
         assert main([str(word) for word in words]) == DONE
 
 
-@pytest.mark.parametrize("content", [
-    {"novel_view": 3}, {"novel_view": {"psnr": "high"}}, {"novel_view": {"psnr": "high", "ssim": 1, "lpips": None}},
-    {"novel_view": None, "f_score": []}, {"albedo": None}, {"novel_view": {}},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"novel_view": 3},
+        {"novel_view": {"psnr": "high"}},
+        {"novel_view": {"psnr": "high", "ssim": 1, "lpips": None}},
+        {"novel_view": None, "f_score": []},
+        {"albedo": None},
+        {"novel_view": {}},
+    ],
+)
 def test_scores_of_other_types(tmp_path, capsys, content):
     (tmp_path / "evaluation.json").write_text(json.dumps(content))
     error = refused(capsys, "evaluate", tmp_path, "--table", tmp_path / "t.md")
@@ -185,13 +194,18 @@ def test_forward_derivatives_raise():
 # ---- errors that nobody foresaw ----
 
 
-@pytest.mark.parametrize(("error", "words"), [
-    (ValueError("no\nsuch"), "unexpected ValueError: no such"), (KeyError("a"), "unexpected KeyError: 'a'"),
-    (TypeError("x"), "unexpected TypeError: x"), (MemoryError(), "not enough memory; use smaller sizes"),
-    (MemoryError("of 3 GiB"), "not enough memory (of 3 GiB); use smaller sizes"),
-    (OSError(errno.EACCES, "Permission denied", "/a/b"), "/a/b: Permission denied"),
-    (RuntimeError("words"), "words"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ValueError("no\nsuch"), "unexpected ValueError: no such"),
+        (KeyError("a"), "unexpected KeyError: 'a'"),
+        (TypeError("x"), "unexpected TypeError: x"),
+        (MemoryError(), "not enough memory; use smaller sizes"),
+        (MemoryError("of 3 GiB"), "not enough memory (of 3 GiB); use smaller sizes"),
+        (OSError(errno.EACCES, "Permission denied", "/a/b"), "/a/b: Permission denied"),
+        (RuntimeError("words"), "words"),
+    ],
+)
 def test_any_error_is_one_line(monkeypatch, capsys, error, words):
     def fails(*_):
         raise error
@@ -209,9 +223,11 @@ def test_any_error_is_one_line(monkeypatch, capsys, error, words):
 def test_a_checkpoint_whose_frame_cannot_be_left(begun, tmp_path):
     content = torch.load(begun[0] / "checkpoint.pt", weights_only=True)
     changes = (
-        lambda box: box.zero_(), lambda box: box[0].neg_(), lambda box: box[3].fill_(1.0),
+        lambda box: box.zero_(),
+        lambda box: box[0].neg_(),
+        lambda box: box[3].fill_(1.0),
         lambda box: box[0, 1].fill_(0.5),
-    )  # fmt: skip
+    )
     for change in changes:
         box = content["box_from_world"].clone()
         change(box)

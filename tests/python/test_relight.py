@@ -10,7 +10,6 @@ import pytest
 import trimesh
 from gltf_builder import Gltf
 from PIL import Image
-
 from splitnerf.cli import BAD_INPUT, DONE, INTERRUPTED, main
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.gltf import read_asset
@@ -18,9 +17,7 @@ from splitnerf.data.images import linear_to_srgb, read_image, write_image
 from splitnerf.errors import InputError
 from splitnerf.relight import job
 from splitnerf.relight.background import Background, compose, environment_behind, fill
-from splitnerf.relight.cameras import (
-    HALF_FIELD, MARGIN, View, bounding_sphere, look_at, path_views, turntable,
-)  # fmt: skip
+from splitnerf.relight.cameras import HALF_FIELD, MARGIN, View, bounding_sphere, look_at, path_views, turntable
 from splitnerf.relight.output import display_frame, straight_srgb
 from splitnerf.render.path_traced import AssetRenderer
 
@@ -103,9 +100,10 @@ def test_a_path_keeps_its_lens_at_any_size(tmp_path):
 
 def test_composition_is_linear_and_the_shadow_darkens_what_is_behind():
     images = {
-        "radiance": np.array([[[0.2, 0.4, 0.6]]], np.float32), "alpha": np.array([[0.5]], np.float32),
+        "radiance": np.array([[[0.2, 0.4, 0.6]]], np.float32),
+        "alpha": np.array([[0.5]], np.float32),
         "shadow": np.array([[0.25]], np.float32),
-    }  # fmt: skip
+    }
     clear = compose(images, None, 2.0)
     assert clear[0, 0] == pytest.approx([0.4, 0.8, 1.2, 0.75])
     behind = np.array([[[1.0, 0.5, 0.0]]], np.float32)
@@ -309,7 +307,10 @@ def test_animations_need_frames_of_one_size(tmp_path, ball, grey, capsys):
         (["{ball}", "--env", "{grey}", "--elevation", "nan"], "--elevation must lie between -90 and 90"),
         (["{ball}", "--env", "{grey}", "--spp", "0"], "--spp must lie between 1 and"),
         (["{ball}", "--env", "{grey}", "--exposure", "nan"], "--exposure must lie between -20 and 20"),
-        *((["{ball}", "--env", "{grey}", "--size", size], "--size must be W or WxH") for size in ("big", "0", "64x", "64x48x3", "99999")),
+        *(
+            (["{ball}", "--env", "{grey}", "--size", size], "--size must be W or WxH")
+            for size in ("big", "0", "64x", "64x48x3", "99999")
+        ),
         (["{ball}", "--env", "{grey}", "--background", "sky"], "sky: no such image"),
         (["{ball}", "--env", "{grey}", "--data", "{tmp}/none"], "none: no such folder"),
         (["{ball}", "--env", "{grey}", "--path", "{tmp}/none.json"], "none.json: no such file"),

@@ -5,14 +5,13 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import generator, unit
-from test_views import LENS, POSE, RADIUS, Given, ball
-
 from splitnerf.fields import LightMlp, Occlusion
 from splitnerf.fields.sdf import SdfSample
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render import renderer
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import ProbePoints, RenderedRays, find_samples, render_rays, render_view
+from test_views import LENS, POSE, RADIUS, Given, ball
 
 FULL = torch.full((16, 16, 16), CELL_OCCUPIED, dtype=torch.uint8)
 
@@ -22,7 +21,11 @@ def oblique(n: int = 20, dtype: torch.dtype = torch.float32) -> tuple[torch.Tens
     g = generator(7)
     offsets = unit(torch.randn(n, 2, generator=g)) * torch.linspace(1.03, 0.2, n)[:, None] * RADIUS
     origins = torch.cat([torch.full((n, 1), 4.0), offsets], 1)
-    return origins.to(dtype), torch.tensor([[-1.0, 0, 0]], dtype=dtype).expand(n, 3), torch.rand(n, generator=g).to(dtype)
+    return (
+        origins.to(dtype),
+        torch.tensor([[-1.0, 0, 0]], dtype=dtype).expand(n, 3),
+        torch.rand(n, generator=g).to(dtype),
+    )
 
 
 def rendered(model: SceneModel, found, **options) -> RenderedRays:
@@ -58,7 +61,9 @@ def test_gradients_of_a_picture_are_its_derivatives():
                 p.add_(shift * along)
                 sides.append(loss().item())
                 p.sub_(shift * along)
-        assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-4, abs=1e-5), name
+        assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-4, abs=1e-5), (
+            name
+        )
 
 
 # ---- samples ----
@@ -119,23 +124,35 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
     """It stands between the samples and the probes, and neighbours are those of samples alone."""
     model, cells = ball()
     rays, g = oblique(), generator(6)
-    probes = ProbePoints(torch.rand(5, 3, generator=g), torch.tensor([0.0, 0.5, 0.999]), 0.1 * torch.randn(3, 3, generator=g))
+    probes = ProbePoints(
+        torch.rand(5, 3, generator=g), torch.tensor([0.0, 0.5, 0.999]), 0.1 * torch.randn(3, 3, generator=g)
+    )
     bare = find_samples(model, cells, *rays, probes=probes)
     n = len(bare.directions)
     for more in (7, n + 3):
         padded = find_samples(model, cells, *rays, probes=probes, capacity=n + more)
         assert len(padded.directions) == len(padded.packed.middles) == n + more
-        assert torch.equal(padded.positions[:n], bare.positions[:n]) and torch.equal(padded.positions[n + more :], bare.positions[n:])
+        assert torch.equal(padded.positions[:n], bare.positions[:n]) and torch.equal(
+            padded.positions[n + more :], bare.positions[n:]
+        )
         assert torch.equal(padded.positions[n : n + more], bare.positions[torch.arange(more) % n])
         assert torch.equal(padded.beside, bare.beside) and bare.beside.tolist() == [0, n // 2, int(0.999 * n)]
         ray, expected = rendered(model, padded, shades_per_ray=2), rendered(model, bare, shades_per_ray=2)
         torch.testing.assert_close((ray.mean, ray.opacity), (expected.mean, expected.opacity))
         assert torch.equal(ray.gradients[n + more :], expected.gradients[n:]) and (ray.weights[n:] == 0).all()
     cut = find_samples(model, cells, *rays, probes=probes, capacity=n - 1)
-    assert torch.equal(cut.positions[: n - 1], bare.positions[: n - 1]) and len(cut.directions) == n - 1 and int(cut.n_found) == n
+    assert (
+        torch.equal(cut.positions[: n - 1], bare.positions[: n - 1])
+        and len(cut.directions) == n - 1
+        and int(cut.n_found) == n
+    )
     empty = torch.full_like(cells, CELL_EMPTY)
     nothing = find_samples(model, empty, *rays, probes=probes, capacity=4)
-    assert (nothing.positions[:4] == 0).all() and torch.equal(nothing.positions[4:9], probes.anywhere) and not nothing.beside.any()
+    assert (
+        (nothing.positions[:4] == 0).all()
+        and torch.equal(nothing.positions[4:9], probes.anywhere)
+        and not nothing.beside.any()
+    )
 
 
 # ---- shading ----
@@ -153,7 +170,9 @@ def test_values_of_shaded_samples_are_those_of_their_places():
     torch.testing.assert_close(ray.normals, unit(field.gradient))
     rays = ray.samples.ray_indices[ray.shaded]
     torch.testing.assert_close(torch.zeros(20).index_add(0, rays, ray.shares), ray.opacity)
-    colours = torch.zeros(20, 3).index_add(0, rays, ray.shares[:, None] * ray.points.radiance) / ray.opacity[:, None].clamp(min=1e-4)
+    colours = torch.zeros(20, 3).index_add(0, rays, ray.shares[:, None] * ray.points.radiance) / ray.opacity[
+        :, None
+    ].clamp(min=1e-4)
     torch.testing.assert_close(ray.mean, colours, rtol=1e-4, atol=1e-4)
     other = rendered(model, found._replace(phase=(found.phase + 0.5) % 1.0), shades_per_ray=2)
     assert not torch.equal(ray.shaded, other.shaded)
@@ -181,23 +200,33 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
         model.variance.fill_(0.37)
     model.config = model.config.replace({"shading.method": "summed"})
     monkeypatch.setattr(model, "surface", Slabs().forward)
-    model.occlusion = Given(lambda query, _: Occlusion(torch.ones(len(query.normals), 1), torch.ones(len(query.normals), 1)))
+    model.occlusion = Given(
+        lambda query, _: Occlusion(torch.ones(len(query.normals), 1), torch.ones(len(query.normals), 1))
+    )
     model.occlusion.ready, model.occlusion.cell_light = True, lambda maps: None
     asked = []
     monkeypatch.setattr(
-        model, "quadrature_correction", lambda *args: asked.append(args) or (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3))
+        model,
+        "quadrature_correction",
+        lambda *args: asked.append(args) or (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3)),
     )
     cells = FULL.clone()
     cells[6:10] = CELL_EMPTY
     n = 4
-    rays = torch.tensor([[4.0, 0.1, 0.2]]).repeat(n, 1), torch.tensor([[-1.0, 0, 0]]).repeat(n, 1), torch.rand(n, generator=generator(3))
+    rays = (
+        torch.tensor([[4.0, 0.1, 0.2]]).repeat(n, 1),
+        torch.tensor([[-1.0, 0, 0]]).repeat(n, 1),
+        torch.rand(n, generator=generator(3)),
+    )
     rays[0][2, 1] = 9.0  # beside the box
     ray = rendered(model, find_samples(model, cells, *rays), shades_per_ray=6, capacity=capacity)
     m, n_rays, n_segments = ray.sizes.tolist()
     assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8
     _, segments = model.occlusion.asked
     x = ray.positions[:, 0]
-    torch.testing.assert_close(x[segments.representatives[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05)
+    torch.testing.assert_close(
+        x[segments.representatives[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05
+    )
     assert torch.equal(x[segments.representatives][segments.segment][:m].sign(), x[:m].sign())
     candidates, number = asked[0][3:]
     assert (number is None) == (capacity is None) and (number is None or number == n_rays)
@@ -217,7 +246,9 @@ def test_a_view_is_made_of_the_rays_of_its_pixels():
         assert torch.equal(maps[name], parts[name]) and maps[name].shape[:2] == (height, width), name
     fx, fy, cx, cy = lens.tolist()
     row, column = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    local = torch.stack([(column + 0.5 - cx) / fx, -(row + 0.5 - cy) / fy, -torch.ones(height, width)], -1).reshape(-1, 3)
+    local = torch.stack([(column + 0.5 - cx) / fx, -(row + 0.5 - cy) / fy, -torch.ones(height, width)], -1).reshape(
+        -1, 3
+    )
     n = height * width
     rays = POSE[:3, 3].expand(n, 3), unit(local @ POSE[:3, :3].T), torch.full((n,), 0.5)
     ray = rendered(model, find_samples(model, cells, *rays))

@@ -14,18 +14,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import splitnerf_tools.report
 from painted_ball import with_textures
 from PIL import Image
-
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.glb import write_glb
 from splitnerf_tools.report import write_report
-from splitnerf_tools.report.sections import fitted
-from splitnerf_tools.report.embedding import script_json
 from splitnerf_tools.report.drawings import curve_data, line_chart
-from splitnerf_tools.report.embedding import data_uri
-import splitnerf_tools.report
+from splitnerf_tools.report.embedding import data_uri, script_json
+from splitnerf_tools.report.sections import fitted
 
 REPORT = Path(splitnerf_tools.report.__file__).parent
 PAGE = REPORT.parent / "pages"
@@ -66,9 +64,13 @@ class Balanced(HTMLParser):
 def make_view(with_truth):
     shape = (6, 6)
     maps = {
-        "rgb": np.full((*shape, 3), 0.5), "alpha": np.ones(shape), "albedo": np.full((*shape, 3), 0.2),
-        "roughness": np.full(shape, 0.4), "metallic": np.zeros(shape), "normal": np.full((*shape, 3), 0.577),
-    }  # fmt: skip
+        "rgb": np.full((*shape, 3), 0.5),
+        "alpha": np.ones(shape),
+        "albedo": np.full((*shape, 3), 0.2),
+        "roughness": np.full(shape, 0.4),
+        "metallic": np.zeros(shape),
+        "normal": np.full((*shape, 3), 0.577),
+    }
     occlusion = {"occlusion_diffuse": np.ones((*shape, 1)), "occlusion_specular": np.ones((*shape, 3))}
     truth = maps | {"rgb": maps["rgb"] + 0.1, "normal_mask": np.ones(shape, bool)} if with_truth else {"albedo": None}
     return {"name": "r_<0>", "truth": truth, "prediction": maps | occlusion}
@@ -122,7 +124,16 @@ def test_report_holds_every_part(tmp_path):
     assert len(parsed.pictures) == 12 + 2 + 8
     assert page.count("<svg") == 3
     assert ">0.1</text>" in re.search(r"Loss</figcaption>.*", page)[0]  # decades, not quarters
-    for text in ("20.00 dB", "29.32", "nested.on", "ρ = 0.25", "true light", "hash_encode", "width:75.0%", "one factor per colour channel"):
+    for text in (
+        "20.00 dB",
+        "29.32",
+        "nested.on",
+        "ρ = 0.25",
+        "true light",
+        "hash_encode",
+        "width:75.0%",
+        "one factor per colour channel",
+    ):
         assert text in page
     for anchor in (reference for reference in parsed.references if reference.startswith("#")):
         assert f'id="{anchor[1:]}"' in page
@@ -139,7 +150,12 @@ def test_report_is_self_contained_and_escaped(tmp_path):
 
 def test_no_name_ends_the_script(tmp_path):
     history = [{"step": s, "loss": 1.0, f"loss_{HOSTILE}": 0.5} for s in range(3)]
-    changes = {"title": HOSTILE, "summary": {HOSTILE: {HOSTILE: HOSTILE}}, "timings": {HOSTILE: 1.0}, "history": history}
+    changes = {
+        "title": HOSTILE,
+        "summary": {HOSTILE: {HOSTILE: HOSTILE}},
+        "timings": {HOSTILE: 1.0},
+        "history": history,
+    }
     page, parsed = write(tmp_path, views=[make_view(True) | {"name": HOSTILE}], **changes)
     assert set(parsed.scripts) == {"data", "bundle"}
     assert data_of(parsed)["charts"][1]["series"][0]["name"] == HOSTILE
@@ -154,7 +170,9 @@ def test_what_is_not_finite_never_reaches_the_script(tmp_path):
     found = data_of(parsed)
     assert found["charts"][0]["x"] == [0, 3] and found["charts"][0]["series"][0]["values"] == [1.0, 2.0]
     assert np.isfinite(found["lights"][0]["white"]) and np.isfinite(halves_of(found["lights"][0])).all()
-    assert "null" not in script_json([1.0, {"a": (2, "x")}]) and script_json({"a": [np.float32("nan")]}) == '{"a":[null]}'
+    assert (
+        "null" not in script_json([1.0, {"a": (2, "x")}]) and script_json({"a": [np.float32("nan")]}) == '{"a":[null]}'
+    )
 
 
 def test_report_without_truth_or_history(tmp_path):
@@ -173,7 +191,10 @@ def test_lights_are_carried_in_16_bits(tmp_path):
     delivered, true = data_of(parsed)["lights"]
     assert (delivered["name"], true["name"]) == ("recovered light", "true light")
     expected = np.minimum(light.reshape(128, 2, 256, 2, 3).mean((1, 3)), 65504)
-    assert np.allclose(halves_of(delivered)[..., :3], expected, rtol=1e-3, atol=1e-6) and (halves_of(delivered)[..., 3] == 1).all()
+    assert (
+        np.allclose(halves_of(delivered)[..., :3], expected, rtol=1e-3, atol=1e-6)
+        and (halves_of(delivered)[..., 3] == 1).all()
+    )
     assert delivered["white"] == pytest.approx(3 * light.mean(), rel=1e-5)
 
 

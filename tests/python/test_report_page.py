@@ -10,7 +10,6 @@ import pytest
 from looking_at import look_at, needs_chromium
 from painted_ball import sky, with_textures
 from PIL import Image
-
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.glb import write_glb
 from splitnerf_tools.report import write_report
@@ -30,9 +29,12 @@ def look(page, steps):
 
 def plain(colour, alpha=1.0):
     return {
-        "rgb": np.full((40, 60, 3), colour), "alpha": np.full((40, 60), alpha), "albedo": np.full((40, 60, 3), 0.25),
-        "roughness": np.full((40, 60), 0.5), "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1)),
-    }  # fmt: skip
+        "rgb": np.full((40, 60, 3), colour),
+        "alpha": np.full((40, 60), alpha),
+        "albedo": np.full((40, 60, 3), 0.25),
+        "roughness": np.full((40, 60), 0.5),
+        "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1)),
+    }
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +54,17 @@ def report(ball, tmp_path_factory):
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
     summary = {"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}}
     write_report(
-        folder / "report.html", title="two </script> views", summary=summary, views=views, lights=[], light_truth=true, light=sky(32),
-        history=history, timings={"training": 3.0}, asset=folder / "mesh.glb",
-    )  # fmt: skip
+        folder / "report.html",
+        title="two </script> views",
+        summary=summary,
+        views=views,
+        lights=[],
+        light_truth=true,
+        light=sky(32),
+        history=history,
+        timings={"training": 3.0},
+        asset=folder / "mesh.glb",
+    )
     return folder / "report.html"
 
 
@@ -82,35 +92,70 @@ def seen(report):
     hidden = ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important }"
     bare = {"do": "style", "content": hidden + ".stage:focus-within, canvas { outline: 0 !important }"}
     asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
-    maps = [step for name in ("albedo", "roughness", "metallic", "normals") for step in (click(name, "object"), part(name, object_))]
+    maps = [
+        step
+        for name in ("albedo", "roughness", "metallic", "normals")
+        for step in (click(name, "object"), part(name, object_))
+    ]
     chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
     steps = [
-        {"do": "size", "width": 700, "height": 600}, {"do": "open"}, bare,
+        {"do": "size", "width": 700, "height": 600},
+        {"do": "open"},
+        bare,
         {"do": "text", "name": "asked", "script": asked},
         {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
-        {"do": "text", "name": "static", "script": "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length"},
-        part("half", stage), point(stage, 0.25, 0.5, press=True), part("quarter", stage), text("readout", "#views .said"),
+        {
+            "do": "text",
+            "name": "static",
+            "script": "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length",
+        },
+        part("half", stage),
+        point(stage, 0.25, 0.5, press=True),
+        part("quarter", stage),
+        text("readout", "#views .said"),
         {"do": "focus", "selector": "#views .stage input"},
-        {"do": "key", "key": "PageUp"}, *[{"do": "key", "key": "ArrowLeft"}] * 2, part("keys", stage),
-        click("error", "views"), part("error", stage), text("mean", "#views .said"), text("scale", "#views .legend-row"),
-        click("normals", "views"), text("angle", "#views .said"), click("roughness", "views"), text("rough", "#views .said"),
-        part("light", true_light), {"do": "set", "selector": "#light .range input", "value": -5}, part("dark", true_light),
-        point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128), text("radiance", "#light .said"),
-        point(f"{chart} .u-over", 0.25, 0.5), text("tip", f"{chart} .tip"),
-        point(f"{chart} .u-over", 0.99, 0.5), text("last", f"{chart} .tip"),
-        point(f"{terms} .u-over", 0.99, 0.5), text("terms", f"{terms} .tip"),
+        {"do": "key", "key": "PageUp"},
+        *[{"do": "key", "key": "ArrowLeft"}] * 2,
+        part("keys", stage),
+        click("error", "views"),
+        part("error", stage),
+        text("mean", "#views .said"),
+        text("scale", "#views .legend-row"),
+        click("normals", "views"),
+        text("angle", "#views .said"),
+        click("roughness", "views"),
+        text("rough", "#views .said"),
+        part("light", true_light),
+        {"do": "set", "selector": "#light .range input", "value": -5},
+        part("dark", true_light),
+        point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128),
+        text("radiance", "#light .said"),
+        point(f"{chart} .u-over", 0.25, 0.5),
+        text("tip", f"{chart} .tip"),
+        point(f"{chart} .u-over", 0.99, 0.5),
+        text("last", f"{chart} .tip"),
+        point(f"{terms} .u-over", 0.99, 0.5),
+        text("terms", f"{terms} .tip"),
         point(f"{terms} .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
-        point(f"{terms} .u-over", 0.98, 0.5), text("fewer", f"{terms} .tip"),
+        point(f"{terms} .u-over", 0.98, 0.5),
+        text("fewer", f"{terms} .tip"),
         {"do": "text", "name": "linear", "script": f"document.querySelector('{terms} .axis input').click()"},
-        point(f"{terms} .u-over", 0.02, 0.5), text("zero", f"{terms} .tip"),
-        part("shaded", object_), *maps,
-        click("shaded", "object"), click("true light", "object"), part("other", object_),
-        {"do": "set", "selector": "#object .range:nth-of-type(2) input", "value": 2}, part("brighter", object_),
+        point(f"{terms} .u-over", 0.02, 0.5),
+        text("zero", f"{terms} .tip"),
+        part("shaded", object_),
+        *maps,
+        click("shaded", "object"),
+        click("true light", "object"),
+        part("other", object_),
+        {"do": "set", "selector": "#object .range:nth-of-type(2) input", "value": 2},
+        part("brighter", object_),
         {"do": "size", "width": 380, "height": 700},
         {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
-    ]  # fmt: skip
+    ]
     told = look(report, steps)
-    return told, {path.stem: np.asarray(Image.open(path).convert("RGB"), np.float32) / 255 for path in folder.glob("*.png")}
+    return told, {
+        path.stem: np.asarray(Image.open(path).convert("RGB"), np.float32) / 255 for path in folder.glob("*.png")
+    }
 
 
 def middle(picture):
@@ -136,7 +181,9 @@ def test_the_slider_parts_truth_and_prediction(seen):
     for name, share in (("half", 0.5), ("quarter", 0.25), ("keys", 0.34)):
         assert share_of(pictures[name], RED) == pytest.approx(share, abs=0.02), name
         assert share_of(pictures[name], BLUE) == pytest.approx(1 - share, abs=0.02), name
-    assert told["texts"]["readout"].startswith("15, 20: truth 0.80 0.20 0.20 · SplitNeRF 0.20 0.20 0.70 · difference 0.36")
+    assert told["texts"]["readout"].startswith(
+        "15, 20: truth 0.80 0.20 0.20 · SplitNeRF 0.20 0.20 0.70 · difference 0.36"
+    )
 
 
 def test_the_error_map_has_the_difference_and_says_its_scale(seen):
@@ -166,7 +213,10 @@ def test_the_exposure_changes_the_lights_pixels(seen):
 
 def test_curves_say_the_values_under_the_pointer(seen):
     texts = seen[0]["texts"]
-    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"] and texts["last"].split("\n") == ["step 800", "loss 0.003906"]
+    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"] and texts["last"].split("\n") == [
+        "step 800",
+        "loss 0.003906",
+    ]
     assert texts["terms"].split("\n") == ["step 800", "colour 1.000e-8", "late 0.001", "light 0.5"]
     assert texts["fewer"].split("\n") == ["step 800", "colour 1.000e-8", "light 0.5"]
     assert texts["zero"].split("\n") == ["step 0", "colour 1", "light 0.5"]
@@ -192,10 +242,12 @@ def test_a_narrow_window_does_not_scroll_sideways(seen):
 
 def test_without_webgl_one_line_takes_the_place_of_the_object(report):
     steps = [
-        {"do": "before", "script": NO_WEBGL}, {"do": "size", "width": 700, "height": 440}, {"do": "open"},
+        {"do": "before", "script": NO_WEBGL},
+        {"do": "size", "width": 700, "height": 440},
+        {"do": "open"},
         {"do": "text", "name": "said", "script": "document.querySelector('#object').innerText"},
         {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
-    ]  # fmt: skip
+    ]
     told = look(report, steps)
     assert told["console"] == [] and told["texts"]["live"] == ["views", "light", "training"]
     assert "no WebGL 2" in told["texts"]["said"]

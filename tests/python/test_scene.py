@@ -6,7 +6,6 @@ import math
 
 import pytest
 import torch
-
 from splitnerf.config import preset
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
@@ -80,9 +79,15 @@ class TestAveragedGrid:
         inside = (asked[0] + 1.5) / (3.0 / 16)
         cell = inside.long()
         now = torch.zeros(4096, dtype=torch.bool).index_fill(0, (cell[:, 0] * 16 + cell[:, 1]) * 16 + cell[:, 2], True)
-        assert now.sum() == len(cell) and now[occupied].float().mean() > 0.8 and 0.15 < now[~occupied].float().mean() < 0.3
+        assert (
+            now.sum() == len(cell) and now[occupied].float().mean() > 0.8 and 0.15 < now[~occupied].float().mean() < 0.3
+        )
         place = inside - cell
-        assert place.min() >= 0 and place.mean().item() == pytest.approx(0.5, abs=0.02) and place.std().item() == pytest.approx(12**-0.5, abs=0.02)
+        assert (
+            place.min() >= 0
+            and place.mean().item() == pytest.approx(0.5, abs=0.02)
+            and place.std().item() == pytest.approx(12**-0.5, abs=0.02)
+        )
         torch.testing.assert_close(grid.values, torch.where(now, 0.95 * before, before))
         grid.update(nothing, 200.0, first=True, step=300)
         grid.update(nothing, 200.0, first=False, step=255)
@@ -127,11 +132,18 @@ class TestHull:
         lenses = torch.tensor([[100.0, 100.0, 80.0, 80.0], [70.0, 90.0, 50.0, 100.0]])
         y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
         masks = torch.stack(
-            [((x - cx) / fx) ** 2 + ((y - cy) / fy) ** 2 < RADIUS**2 / (distance**2 - RADIUS**2) for fx, fy, cx, cy in lenses]
+            [
+                ((x - cx) / fx) ** 2 + ((y - cy) / fy) ** 2 < RADIUS**2 / (distance**2 - RADIUS**2)
+                for fx, fy, cx, cy in lenses
+            ]
         )
         masks[1] &= y < lenses[1, 3]
         hull = visual_hull(32, 1.5, 0.2 * masks.float(), orbit(4)[:2], lenses).reshape(-1)
         centres = OccupancyGrid(32, 1.5).centres()
         assert hull[(centres.norm(dim=1) < RADIUS) & (centres[:, 2] > 0)].all()
-        for beside in (centres[:, 1:].norm(dim=1) - 0.4, centres[:, ::2].norm(dim=1) - 0.4, RADIUS - centres[:, 2] - 0.3):
+        for beside in (
+            centres[:, 1:].norm(dim=1) - 0.4,
+            centres[:, ::2].norm(dim=1) - 0.4,
+            RADIUS - centres[:, 2] - 0.3,
+        ):
             assert not hull[beside > RADIUS].any()

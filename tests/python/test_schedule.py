@@ -8,8 +8,6 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from tiny_runs import tiny
-
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
@@ -18,8 +16,15 @@ from splitnerf.training import losses
 from splitnerf.training import schedule as optimiser_module
 from splitnerf.training import step as step_module
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.schedule import make_optimiser, set_learning_rate
-from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count
+from splitnerf.training.schedule import (
+    cosine_anneal,
+    light_moves,
+    light_period,
+    make_optimiser,
+    next_ray_count,
+    set_learning_rate,
+)
+from tiny_runs import tiny
 
 
 def one_parameter(rate: float = 1.0) -> torch.optim.Optimizer:
@@ -37,13 +42,20 @@ def factor(config: Config, step: int) -> float:
 # ---- the learning rate ----
 
 
-@pytest.mark.parametrize(("warmup", "steps", "expected"), [
-    (50, 1000, {0: 1 / 50, 24: 25 / 50, 49: 1.0, 50: 1.0}),  # in equal steps
-    # then lr(p) = f^((p - w) / (1 - w)) after a warm-up of the share w: equal factors in equal times, f at the end
-    (200, 1000, {200: 1.0, 400: 0.01**0.25, 401: 0.01 ** (201 / 800), 600: 0.1, 800: 0.01**0.75, 1000: 0.01}),
-    (0, 100, {0: 1.0, 50: 0.1, 100: 0.01}),
-    (80, 100, {0: 1 / 80, 49: 50 / 80, 75: 76 / 80 * 0.1, 100: 0.01}),  # the decay begins at half of the run at the latest
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("warmup", "steps", "expected"),
+    [
+        (50, 1000, {0: 1 / 50, 24: 25 / 50, 49: 1.0, 50: 1.0}),  # in equal steps
+        # then lr(p) = f^((p - w) / (1 - w)) after a warm-up of the share w: equal factors in equal times, f at the end
+        (200, 1000, {200: 1.0, 400: 0.01**0.25, 401: 0.01 ** (201 / 800), 600: 0.1, 800: 0.01**0.75, 1000: 0.01}),
+        (0, 100, {0: 1.0, 50: 0.1, 100: 0.01}),
+        (
+            80,
+            100,
+            {0: 1 / 80, 49: 50 / 80, 75: 76 / 80 * 0.1, 100: 0.01},
+        ),  # the decay begins at half of the run at the latest
+    ],
+)
 def test_the_rate_warms_up_and_decays(warmup, steps, expected):
     config = Config().replace({"steps": steps, "warmup_steps": warmup, "final_learning_rate": 0.01})
     for step, rate in expected.items():
@@ -95,11 +107,17 @@ def test_sparse_steps_leave_entries_without_a_gradient_alone(monkeypatch, sparse
 # ---- levels, annealing ----
 
 
-@pytest.mark.parametrize(("settings", "opened"), [
-    ({"n_levels": 6, "start_levels": 2, "levels_open_by": 0.5}, {0.0: 2, 0.124: 2, 0.126: 3, 0.376: 5, 0.499: 5, 0.5: 6, 1.0: 6}),
-    ({"n_levels": 6, "start_levels": 2, "levels_open_by": 0.0}, {0.0: 6, 1.0: 6}),
-    ({"n_levels": 3, "start_levels": 4}, {0.0: 3, 1.0: 3}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("settings", "opened"),
+    [
+        (
+            {"n_levels": 6, "start_levels": 2, "levels_open_by": 0.5},
+            {0.0: 2, 0.124: 2, 0.126: 3, 0.376: 5, 0.499: 5, 0.5: 6, 1.0: 6},
+        ),
+        ({"n_levels": 6, "start_levels": 2, "levels_open_by": 0.0}, {0.0: 6, 1.0: 6}),
+        ({"n_levels": 3, "start_levels": 4}, {0.0: 3, 1.0: 3}),
+    ],
+)
 def test_levels_open_evenly(settings, opened):
     model = SceneModel(tiny(**settings))
     for progress, n in opened.items():
@@ -186,10 +204,21 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     """Levels, anneal, rates, and the terms that begin late or stand for several steps, as a run of 41 steps has them."""
     n = 41
     config = tiny(
-        steps=n, n_levels=8, start_levels=2, levels_open_by=0.6, cos_anneal_by=0.5, warmup_steps=8, final_learning_rate=0.1,
-        light_step_every=4, priors_from=0.5, entropy_weight=0.01, binary_metal_weight=0.01, neutral_weight=0.03, light_prior_weight=0.002,
+        steps=n,
+        n_levels=8,
+        start_levels=2,
+        levels_open_by=0.6,
+        cos_anneal_by=0.5,
+        warmup_steps=8,
+        final_learning_rate=0.1,
+        light_step_every=4,
+        priors_from=0.5,
+        entropy_weight=0.01,
+        binary_metal_weight=0.01,
+        neutral_weight=0.03,
+        light_prior_weight=0.002,
         mesh_every=0.25,
-    )  # fmt: skip
+    )
     levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active, step_module)
     anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5], step_module)
     rates = recorded(

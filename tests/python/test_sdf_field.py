@@ -8,11 +8,10 @@ import pytest
 import torch
 from op_checks import generator, unit
 from precision import precisions
-from torch.nn import functional as F
-
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render.model import sharpness
+from torch.nn import functional as F
 
 BOX = 1.2
 SPEC = HashGridSpec(n_levels=4, base_resolution=4, growth=2.0, log2_table_size=8)

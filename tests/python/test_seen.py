@@ -70,7 +70,9 @@ def test_one_ray_that_slips_through_shows_nothing():
 def test_behind_a_camera_nothing_is_seen():
     pose = torch.eye(4)
     pose[2, 3] = -DISTANCE  # looks down, away from the sphere
-    assert not seen(sphere(0.5), from_above(focal=1e-4)._replace(poses=pose[None])).any()  # so wide that it would show all
+    assert not seen(
+        sphere(0.5), from_above(focal=1e-4)._replace(poses=pose[None])
+    ).any()  # so wide that it would show all
 
 
 def test_all_cameras_count():
@@ -118,9 +120,16 @@ def test_a_cap_keeps_its_places_and_normals():
         return 0.5 + 0.5 * x[:, 2:].expand(-1, 3), *surface.materials(x)[1:3], surface.gradient(x)[1]
 
     found = textured_asset(
-        "ball", np.float32(mesh.vertices), np.int32(mesh.faces), dataclasses.replace(surface, materials=leaning),
-        n_faces=0, texture_size=128, spacing=0.05, occlusion_offset=0.01, on_surface=mesh.vertices[:, 2] > 0,
-    ).asset  # fmt: skip
+        "ball",
+        np.float32(mesh.vertices),
+        np.int32(mesh.faces),
+        dataclasses.replace(surface, materials=leaning),
+        n_faces=0,
+        texture_size=128,
+        spacing=0.05,
+        occlusion_offset=0.01,
+        on_surface=mesh.vertices[:, 2] > 0,
+    ).asset
     radius, up = np.linalg.norm(found.vertices, axis=1), found.vertices[:, 2]
     assert radius[up > 0.1] == pytest.approx(0.8, abs=1e-4) and radius[up < -0.01] == pytest.approx(0.82, abs=1e-6)
     tilt = (found.normals * found.vertices).sum(1) / radius

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 import torch
 from blender_data import look_at
-from tiny_runs import train
-
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_image, write_image
@@ -21,22 +19,32 @@ from splitnerf.data.photos import separated_mask
 from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
 from splitnerf_tools.capture import masks as capture_masks
-from splitnerf_tools.separation import separate as separation, training
+from splitnerf_tools.separation import separate as separation
+from splitnerf_tools.separation import training
 from splitnerf_tools.separation.field import (
-    RadianceField, RayMeasure, Rendered, contracted, resampled, search_loss, spread_loss, with_less_gradient,
-)  # fmt: skip
+    RadianceField,
+    RayMeasure,
+    Rendered,
+    contracted,
+    resampled,
+    search_loss,
+    spread_loss,
+    with_less_gradient,
+)
 from splitnerf_tools.separation.foot import find_foot
+from splitnerf_tools.separation.ground import Table, find_table
 from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors
 from splitnerf_tools.separation.region import CELLS, Region, find_region
-from splitnerf_tools.separation.ground import Table, find_table
+from tiny_runs import train
 
 SIZE, FOCAL = 40, 40.0
 
 
 def rendered(weights, edges, first_weights=None, first_edges=None):
     weights, edges = torch.tensor([weights]), torch.tensor([edges])
-    first = (weights if first_weights is None else torch.tensor([first_weights])), (
-        edges if first_edges is None else torch.tensor([first_edges])
+    first = (
+        (weights if first_weights is None else torch.tensor([first_weights])),
+        (edges if first_edges is None else torch.tensor([first_edges])),
     )
     return Rendered(torch.zeros(1, 3), weights, edges[:, 1:], edges, *first)
 
@@ -91,7 +99,9 @@ class TestField:
             field.trunk[2].bias[0] = 8.0  # fog everywhere
             fog = field.render(o, d, 32, 16)
             behind = field.render(o, d, 32, 16, hidden=lambda points: points[..., 0] > 0)
-        assert float(fog.weights.sum()) == pytest.approx(1, abs=1e-5) and float(fog.distances[0, fog.weights.argmax()]) < 1
+        assert (
+            float(fog.weights.sum()) == pytest.approx(1, abs=1e-5) and float(fog.distances[0, fog.weights.argmax()]) < 1
+        )
         assert float(behind.weights.sum()) == pytest.approx(1, abs=1e-5)
         assert float(behind.distances[0, behind.weights.argmax()]) > 3
 
@@ -144,7 +154,9 @@ def pattern(points: np.ndarray, colour: list[float]) -> np.ndarray:
     return np.array(colour) * (0.5 + 0.5 * np.modf(np.abs(np.sin(tiles) * 43.7))[0][..., None])
 
 
-def ball_on_floor(origins: np.ndarray, rays: np.ndarray, radius: float = RADIUS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ball_on_floor(
+    origins: np.ndarray, rays: np.ndarray, radius: float = RADIUS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Colours [..., 3] of a patterned ball on a patterned floor, distances [...], and whether it is the ball [...]."""
     apart = origins - CENTRE
     half = (rays * apart).sum(-1)
@@ -154,7 +166,11 @@ def ball_on_floor(origins: np.ndarray, rays: np.ndarray, radius: float = RADIUS)
     on_ball, on_floor = (origins + t[..., None] * rays for t in (t_ball, t_floor))
     ground = np.where(rays[..., 2:] < 0, pattern(on_floor[..., :2], [0.2, 0.7, 0.3]), [0.5, 0.6, 0.9])
     hit = (inside > 0) & (t_ball > 0)
-    return np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground), np.where(hit, t_ball, t_floor), hit
+    return (
+        np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground),
+        np.where(hit, t_ball, t_floor),
+        hit,
+    )
 
 
 def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False) -> list[np.ndarray]:
@@ -206,7 +222,9 @@ class TestReading:
         masks = write_ball_on_floor(tmp_path / "data", 8, alpha=alpha)
         for i, mask in enumerate(masks):
             small = mask.reshape(SIZE // 2, 2, SIZE // 2, 2).mean((1, 3))
-            write_image(tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png", tmp_path / "data"), small)
+            write_image(
+                tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png", tmp_path / "data"), small
+            )
         photos = load_dataset(tmp_path / "data", reading=Reading("all", separated=tmp_path / "found"))
         assert photos.masked
         agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
@@ -236,7 +254,9 @@ def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     assert overlap(run, masks) > 0.9
     assert (run / SEPARATED / "sheet.jpg").is_file() and (run / "mesh.glb").is_file()
     floor = read_image(run / SEPARATED / "surroundings.exr")[36:48]
-    assert floor.shape[1:] == (128, 4) and floor[..., 1].mean() > 2 * floor[..., 0].mean() and floor[..., 3].mean() > 0.6
+    assert (
+        floor.shape[1:] == (128, 4) and floor[..., 1].mean() > 2 * floor[..., 0].mean() and floor[..., 3].mean() > 0.6
+    )
     assert "above a table" in capsys.readouterr().err
     assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 0
     (run / SEPARATED / "images/p0.png").write_bytes(b"")
@@ -318,7 +338,9 @@ class TestFoot:
     def over(self, radius: float, height: float) -> torch.Tensor:
         angle = np.linspace(0, 2 * np.pi, 60)
         at = radius * np.stack([np.cos(angle), np.sin(angle)], 1)
-        return torch.from_numpy((at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32))
+        return torch.from_numpy(
+            (at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32)
+        )
 
     def test_a_plinth_lower_than_the_noise_of_points_is_found(self):
         foot = find_foot(self.TABLE, *self.scene(0.012, 0.012))
@@ -362,7 +384,10 @@ class TestFoot:
         shown = np.linalg.norm(points @ self.TABLE.axes.T, axis=1) > 0.3
         random = np.random.default_rng(1)
         hanging = random.uniform(-0.4, 0.4, (4000, 2))
-        hanging = hanging[np.linalg.norm(hanging, axis=1) < 0.35] @ self.TABLE.axes + (self.TABLE.offset + 0.3) * self.TABLE.normal
+        hanging = (
+            hanging[np.linalg.norm(hanging, axis=1) < 0.35] @ self.TABLE.axes
+            + (self.TABLE.offset + 0.3) * self.TABLE.normal
+        )
         foot = find_foot(self.TABLE, points[shown], colours[shown], hanging)
         assert foot.holds(self.over(0.2, 0.05)).all() and not foot.holds(self.over(0.2, 0.01)).any()
         assert not foot.holds(self.over(0.5, 0.05)).any()
@@ -371,7 +396,9 @@ class TestFoot:
         points, colours, post = self.scene(0.012, 0.003)
         apart = np.linalg.norm(points @ self.TABLE.axes.T - [0.6, 0.6], axis=1) < 0.1
         foot = find_foot(self.TABLE, points + apart[:, None] * 0.02 * self.TABLE.normal, colours, post)
-        beside = torch.from_numpy((np.array([[0.6, 0.6]]) @ self.TABLE.axes + self.TABLE.offset * self.TABLE.normal).astype(np.float32))
+        beside = torch.from_numpy(
+            (np.array([[0.6, 0.6]]) @ self.TABLE.axes + self.TABLE.offset * self.TABLE.normal).astype(np.float32)
+        )
         assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
 
     @pytest.mark.parametrize("place, raised, held", [(0.36, -0.012, True), (0.44, 0.02, False)])
@@ -392,7 +419,9 @@ class TestFoot:
     def test_the_region_goes_by_its_foot_near_the_table(self):
         points, colours, post = self.scene(0.012, 0.006)
         column = post + np.linspace(0, 0.5, len(post))[:, None] * self.TABLE.normal
-        region = find_region(np.concatenate([points, *[column] * 20]), Table.through(self.TABLE.normal, self.TABLE.offset, points))
+        region = find_region(
+            np.concatenate([points, *[column] * 20]), Table.through(self.TABLE.normal, self.TABLE.offset, points)
+        )
         shown = np.concatenate([points, column]).astype(np.float32)
         region = region.with_foot(shown, np.concatenate([colours, 0 * column]))
         assert region.holds(self.over(0.38, 0.01)).all() and region.holds(self.over(0.05, 0.4)).all()
@@ -401,7 +430,10 @@ class TestFoot:
 
     def test_what_seems_to_lie_below_the_table_is_on_it(self):
         region = Region(np.ones((CELLS,) * 3, bool), self.TABLE)
-        o, d = torch.tensor([[0.0, 2, 2], [0.0, 2, 2], [0.0, -3, -3]]), torch.tensor([[0.0, -0.6, -0.8], [0.0, 0.6, 0.8], [0.0, -0.6, -0.8]])
+        o, d = (
+            torch.tensor([[0.0, 2, 2], [0.0, 2, 2], [0.0, -3, -3]]),
+            torch.tensor([[0.0, -0.6, -0.8], [0.0, 0.6, 0.8], [0.0, -0.6, -0.8]]),
+        )
         found = region.above_table(o, d, torch.tensor([[1.0, 9.0]] * 3))
         torch.testing.assert_close(found, torch.tensor([[1.0, 2.9], [1.0, 9.0], [1.0, 9.0]]))
         assert torch.equal(Region(np.ones((CELLS,) * 3, bool), None).above_table(o, d, found), found)
@@ -411,7 +443,9 @@ class TestOutline:
     def test_it_moves_to_where_the_colours_change(self):
         y, x = np.mgrid[:40, :40] + 0.5
         true = np.hypot(x - 20, y - 20) < 10
-        photo = np.where(true[..., None], [0.6, 0.3, 0.2], [0.4, 0.5, 0.5]) + 0.02 * np.random.default_rng(0).normal(size=(40, 40, 3))
+        photo = np.where(true[..., None], [0.6, 0.3, 0.2], [0.4, 0.5, 0.5]) + 0.02 * np.random.default_rng(0).normal(
+            size=(40, 40, 3)
+        )
         moved = np.clip(11.5 - np.hypot(x - 20.5, y - 20), 0, 1)
         found = at_edges(moved.astype(np.float32), photo.astype(np.float32))
         assert (moved > 0.5).sum() > 1.1 * true.sum() and ((found > 0.5) == true).mean() > 0.99

@@ -6,11 +6,10 @@ import pytest
 import reference
 import torch
 from op_checks import generator, unit
-from tiny_runs import tiny
-
 from splitnerf.fields import EvaluatedLight, Light, Occlusion
 from splitnerf.ops import brdf_lut
 from splitnerf.render.model import SceneModel, ShadedPoints
+from tiny_runs import tiny
 
 K = 60  # points
 
@@ -80,8 +79,9 @@ def test_light_of_the_object_itself_comes_in_where_the_sky_does_not():
     dark = TwoLights(0.0, 0.0)
     blocked = factors(0.25, 0.5)._replace(indirect_diffuse=sent_d, indirect_specular=sent_s)
     for materials, light, sky, sent in (
-        (points_of(1.0), TwoLights(2.0, 3.0), 0.5 * 3.0, 0.4), (points_of(0.0), TwoLights(2.0, 0.0), 0.25 * 2.0, 0.7),
-    ):  # fmt: skip
+        (points_of(1.0), TwoLights(2.0, 3.0), 0.5 * 3.0, 0.4),
+        (points_of(0.0), TwoLights(2.0, 0.0), 0.25 * 2.0, 0.7),
+    ):
         only = Occlusion(*blocked[:2], sent_d, sent_s if materials[2][0] == 1 else 0 * sent_s)
         unit_light = shade(TwoLights(1.0, 1.0 if materials[2][0] == 1 else 0.0), materials).radiance
         torch.testing.assert_close(shade(light, materials, only).radiance, (sky + sent) * unit_light)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from bench import shapes as bench
 from bench import tables
-
 from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -141,10 +140,12 @@ def test_the_command_names_what_there_is():
 @pytest.mark.parametrize(
     ("words", "listed"),
     [
-        ("--shape cup", SHAPES), ("--shape mug --material wood", MATERIALS), ("", ["ASSET.glb", "--shape"]),
+        ("--shape cup", SHAPES),
+        ("--shape mug --material wood", MATERIALS),
+        ("", ["ASSET.glb", "--shape"]),
         ("a.glb --shape mug", ["ASSET.glb", "--shape"]),
     ],
-)  # fmt: skip
+)
 def test_wrong_names_are_refused_in_a_line_that_lists_the_right_ones(words, listed, capsys):
     with pytest.raises(SystemExit) as ended:
         build_parser().parse_args(f"synth {words} --light l.hdr --out o".split())

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 import torch
 from blender_data import ANGLE, SIZE, make_blender
-from tiny_runs import tiny
-
 from splitnerf.cli import DONE, main
 from splitnerf.config import Config
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
@@ -25,6 +23,7 @@ from splitnerf.render.edges import average_with_edges
 from splitnerf.render.rays import PixelSource, pixel_rays
 from splitnerf.render.seen import Cameras
 from splitnerf.training.loop import Training
+from tiny_runs import tiny
 
 FOCAL = 0.5 * SIZE / np.tan(0.5 * ANGLE)
 # left, top, right, bottom of the parts of the photos that are kept, in turn
@@ -46,7 +45,13 @@ def cut(root: Path, data: Path) -> Path:
                 l, t, r, b = (round(scale * x) for x in (left, top, right, bottom))
                 write_image(file, pixels[t:b, l:r])
             whole = len(pixels)
-            frame |= {"fl_x": 0.5 * whole / np.tan(0.5 * angle), "cx": whole / 2 - l, "cy": whole / 2 - t, "w": r - l, "h": b - t}
+            frame |= {
+                "fl_x": 0.5 * whole / np.tan(0.5 * angle),
+                "cx": whole / 2 - l,
+                "cy": whole / 2 - t,
+                "w": r - l,
+                "h": b - t,
+            }
         path.write_text(json.dumps(content))
     return data
 
@@ -81,7 +86,11 @@ def test_averages_have_whole_blocks_of_each_photo_alone(mixed, downscale):
     parts = load_dataset(mixed)
     small = load_dataset(mixed, downscale=downscale) if downscale > 1 else parts
     assert (small.sizes == parts.sizes // downscale).all()
-    averaged = [small] + ([parts.averaged(downscale, 0.0), parts.averaged(downscale, 0.0, partial(average_with_edges, width=2))] if downscale > 1 else [])
+    averaged = [small] + (
+        [parts.averaged(downscale, 0.0), parts.averaged(downscale, 0.0, partial(average_with_edges, width=2))]
+        if downscale > 1
+        else []
+    )
     for split in averaged:
         assert (split.sizes == small.sizes).all()
         for i in range(len(split)):
@@ -127,7 +136,9 @@ def test_photos_of_two_sizes_become_an_asset(data, tmp_path, capsys):
     assert main(["train", str(mixed), "--out", str(run), "--steps", "30", "--no-refine"]) == DONE
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["novel_view"]["psnr"] > 10 and (run / "mesh.glb").is_file() and (run / "report.html").is_file()
-    assert main(["evaluate", str(run), "--data", str(mixed), "--spp", "1", "--sheet", str(tmp_path / "sheet.png")]) == DONE
+    assert (
+        main(["evaluate", str(run), "--data", str(mixed), "--spp", "1", "--sheet", str(tmp_path / "sheet.png")]) == DONE
+    )
     assert main(["inspect", str(mixed), "--out", str(tmp_path / "page.html")]) == DONE
     sizes = {f"{view.width}x{view.height}" for view in data_views(mixed, "train", None)}
     assert len(sizes) == 4
@@ -141,7 +152,9 @@ def test_a_photo_that_is_no_scaled_copy_of_the_one_of_its_lens_is_refused(square
     turned = cut(square, tmp_path / "turned")
     path = turned / "train/r_1.png"
     write_image(path, read_image(path).transpose(1, 0, 2))
-    with pytest.raises(InputError, match=f"r_1.png: is {SIZE}x34, but its lens is stated for 34x{SIZE}; turn the image"):
+    with pytest.raises(
+        InputError, match=f"r_1.png: is {SIZE}x34, but its lens is stated for 34x{SIZE}; turn the image"
+    ):
         load_dataset(turned)
     with pytest.raises(InputError, match="r_1.png: is 48x34, but its lens is stated"):
         data_views(turned, "train", None)

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 import torch
+from splitnerf import ops
 from stability import cases, fields, light, losses, properties, rays, search, shading, table
 from stability.__main__ import BAD_INPUT, BROKEN, DONE, main
 from stability.entry import Entry
 from stability.measure import cast, evaluate
 from torch.utils._python_dispatch import TorchDispatchMode
-
-from splitnerf import ops
 
 TESTS = Path(__file__).parents[1]
 CASES, EXACT = 100_000, 50
@@ -59,7 +58,14 @@ class Called(TorchDispatchMode):
 def test_every_registered_operator_is_asked():
     """What the entries and the properties call, forward and backward, against all that the library registers."""
     not_asked = {"sample_rays", "interpolate_backward"}  # joins the formulas of others; linear
-    for module in (fields, light, losses, properties, rays, shading):  # what another test has made would not be made here
+    for module in (
+        fields,
+        light,
+        losses,
+        properties,
+        rays,
+        shading,
+    ):  # what another test has made would not be made here
         for made in vars(module).values():
             if hasattr(made, "cache_clear"):
                 made.cache_clear()
@@ -68,7 +74,9 @@ def test_every_registered_operator_is_asked():
             evaluate(entry, cast(entry.draw(cases.Draw(0), 4), torch.float32), torch.float32)
         for claim in table.PROPERTIES:
             properties.verify(claim, 4 * claim.size)
-    registered = {name.partition("::")[2] for name in torch._C._dispatch_get_all_op_names() if name.startswith("splitnerf::")}
+    registered = {
+        name.partition("::")[2] for name in torch._C._dispatch_get_all_op_names() if name.startswith("splitnerf::")
+    }
     assert registered - called.names == not_asked
 
 
@@ -160,16 +168,20 @@ def test_the_condition_forgives_cancellation_but_no_other_error():
 
 def test_a_float64_that_is_wrong_is_caught_by_exact_arithmetic():
     entry = planted(
-        corner(0, 1, 1), call=lambda rows, shared: {"y": rows["x"] ** 2 * (1 + 1e-7)}, smooth=(),
+        corner(0, 1, 1),
+        call=lambda rows, shared: {"y": rows["x"] ** 2 * (1 + 1e-7)},
+        smooth=(),
         exact=lambda row, shared: {"y": [float(row["x"][0]) ** 2]},
-    )  # fmt: skip
+    )
     found = search.run(entry, 100)
     assert found.forward < 1e-6 and found.exact == pytest.approx(1e-7, rel=1e-3) and not found.holds
 
 
 def test_the_same_seed_gives_the_same_errors():
     first, second = (search.run(BY_NAME["linear_to_srgb"], 2000, seed=5, exact=1) for _ in range(2))
-    assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(second.worst_forward)
+    assert first.forward == second.forward and table.input_text(first.worst_forward) == table.input_text(
+        second.worst_forward
+    )
 
 
 # ---- the command -------------------------------------------------------------------------------
@@ -180,9 +192,15 @@ def test_the_command_writes_both_tables(tmp_path, capsys):
     assert main(["--cases", "500", "--out", str(tmp_path), *names]) == DONE
     assert "srgb_to_linear" in capsys.readouterr().out
     text = (tmp_path / "stability.md").read_text()
-    for part in ("processor ", "torch ", "commit ", "date ", "measures `cpp ",
-                 "command `make stability STABILITY_CASES=500 STABILITY_OPTIONS='--seed 0 --op srgb_to_linear --op oc",
-                 "| srgb_to_linear | "):  # fmt: skip
+    for part in (
+        "processor ",
+        "torch ",
+        "commit ",
+        "date ",
+        "measures `cpp ",
+        "command `make stability STABILITY_CASES=500 STABILITY_OPTIONS='--seed 0 --op srgb_to_linear --op oc",
+        "| srgb_to_linear | ",
+    ):
         assert part in text
     lines = (tmp_path / "stability.csv").read_text().splitlines()
     assert lines[0].startswith("# processor: ") and any(line.startswith("operator,inputs,") for line in lines)
@@ -212,7 +230,11 @@ def test_without_mpmath_one_line_says_what_to_install():
 # ---- what cannot be answered -------------------------------------------------------------------
 
 ENTRY_OF_EACH = {name: entry for name, entry in BY_NAME.items() if "," not in name}
-ROW_BY_ROW = [name for name, entry in ENTRY_OF_EACH.items() if entry.size == 1 or name in ("monte_carlo_light", "composite", "summed_light")]
+ROW_BY_ROW = [
+    name
+    for name, entry in ENTRY_OF_EACH.items()
+    if entry.size == 1 or name in ("monte_carlo_light", "composite", "summed_light")
+]
 
 
 @pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])

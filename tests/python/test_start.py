@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from tiny_runs import tiny
-
 from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
@@ -18,26 +16,25 @@ from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
 from splitnerf.training import start, state
 from splitnerf.training.loop import Training, train
-from splitnerf.training.start import (
-    CLEAR_SHARE,
-    MARGIN,
-    StartShape,
-    exact_distances,
-    fit_to,
-    surface_depths,
-)
+from splitnerf.training.start import CLEAR_SHARE, MARGIN, StartShape, exact_distances, fit_to, surface_depths
 from splitnerf_tools.synth.orbits import spiral
+from tiny_runs import tiny
 
 SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48
 
 
 def open_box() -> trimesh.Trimesh:
     """A box from -0.6 to 0.6 with walls of 0.2, whose cavity of 0.8 x 0.8 x 1 is open above."""
-    walls = [trimesh.creation.box(bounds=b) for b in (
-        [[-0.6, -0.6, -0.6], [0.6, 0.6, -0.4]],
-        [[-0.6, -0.6, -0.4], [-0.4, 0.6, 0.6]], [[0.4, -0.6, -0.4], [0.6, 0.6, 0.6]],
-        [[-0.4, -0.6, -0.4], [0.4, -0.4, 0.6]], [[-0.4, 0.4, -0.4], [0.4, 0.6, 0.6]],
-    )]  # fmt: skip
+    walls = [
+        trimesh.creation.box(bounds=b)
+        for b in (
+            [[-0.6, -0.6, -0.6], [0.6, 0.6, -0.4]],
+            [[-0.6, -0.6, -0.4], [-0.4, 0.6, 0.6]],
+            [[0.4, -0.6, -0.4], [0.6, 0.6, 0.6]],
+            [[-0.4, -0.6, -0.4], [0.4, -0.4, 0.6]],
+            [[-0.4, 0.4, -0.4], [0.4, 0.6, 0.6]],
+        )
+    ]
     return trimesh.util.concatenate(walls)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import generator, rand
-
 from splitnerf.config import preset
 from splitnerf.ops import PackedSamples, ShadingSubset
 from splitnerf.render.model import wide_lobes
@@ -16,13 +15,17 @@ from splitnerf.training.losses import material_losses
 # ---- points ----
 
 RAYS = torch.tensor([[0.0, 0, 0], [10, 0, 0]]), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
-SAMPLES = PackedSamples(torch.tensor([0, 0, 1]), torch.tensor([1.0, 2, 3]), torch.tensor([2.0, 3, 4]), torch.tensor([0, 2, 3]))
+SAMPLES = PackedSamples(
+    torch.tensor([0, 0, 1]), torch.tensor([1.0, 2, 3]), torch.tensor([2.0, 3, 4]), torch.tensor([0, 2, 3])
+)
 MIDDLES = [[1.5, 0, 0], [2.5, 0, 0], [10, 3.5, 0]]
 ANYWHERE, SHIFTS = torch.tensor([[5.0, 5, 5]]), torch.tensor([[0.0, 0, 1], [0, 0, 2]])
 
 
 def placed(samples: PackedSamples, chosen: list[float], padded: bool) -> tuple[list, torch.Tensor, list]:
-    positions, directions, beside = place_samples(*RAYS, samples, ProbePoints(ANYWHERE, torch.tensor(chosen), SHIFTS), padded)
+    positions, directions, beside = place_samples(
+        *RAYS, samples, ProbePoints(ANYWHERE, torch.tensor(chosen), SHIFTS), padded
+    )
     return positions.tolist(), directions, beside.tolist()
 
 
@@ -37,14 +40,21 @@ def test_without_samples_only_given_points_are_left():
     positions, directions, beside = placed(none, [0.5, 0.99], False)
     assert positions == [[5, 5, 5]] and len(directions) == 0 and beside == []
     positions, directions, beside = placed(none.extended(2), [0.5, 0.99], True)
-    assert positions == [[0, 0, 0], [0, 0, 0], [5, 5, 5], [0, 0, 1], [0, 0, 2]] and not directions.any() and beside == [0, 0]
+    assert (
+        positions == [[0, 0, 0], [0, 0, 0], [5, 5, 5], [0, 0, 1], [0, 0, 2]]
+        and not directions.any()
+        and beside == [0, 0]
+    )
 
 
 def test_probes_fill_the_cube_and_shifts_are_normal():
     """Each coordinate by its quantiles, no two related."""
     n = 40_000
     config = preset("cpu").replace(
-        {f"constants.{name}": x for name, x in dict(eikonal_points=n, smoothness_points=n, smoothness_radius=0.5, box=1.3).items()}
+        {
+            f"constants.{name}": x
+            for name, x in dict(eikonal_points=n, smoothness_points=n, smoothness_radius=0.5, box=1.3).items()
+        }
     )
     chosen, random = (torch.rand(k, generator=generator(3), dtype=torch.float64) for k in probe_counts(config))
     anywhere, _, shifts = make_probes(config, chosen, random)
@@ -70,7 +80,9 @@ def test_a_correction_counts_by_the_share_of_its_segment():
     for k, added in zip(at.tolist(), correction):
         ray = rays[shaded[k]]
         expected[ray] += added * shares[segment == segment[k]].sum() / opacity[ray].clamp(min=MIN_OPACITY)
-    torch.testing.assert_close(add_corrections(mean, correction, at, spread, rays, shares, opacity), expected, rtol=1e-12, atol=1e-12)
+    torch.testing.assert_close(
+        add_corrections(mean, correction, at, spread, rays, shares, opacity), expected, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_the_share_of_wide_lobes_rises_smoothly_over_the_band():
@@ -95,7 +107,9 @@ def test_metals_by_hand():
     """Eq. (18); a metal by halves; dark metals, but neither bright ones nor dielectrics; nothing costs nothing."""
     metallic, shares = torch.tensor([[1.0], [0.4]]), torch.tensor([0.5, 0.25])
     metal, binary, _ = material_losses(torch.ones(2, 3), metallic, shares)
-    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75) and binary.item() == pytest.approx(0.25 * 0.24 / 0.75)
+    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75) and binary.item() == pytest.approx(
+        0.25 * 0.24 / 0.75
+    )
     albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]])
     dark = material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[2]
     assert dark.item() == pytest.approx((1 - 0.2 / 0.4) / 3)

@@ -9,12 +9,11 @@ import torch
 import trimesh
 from mesh_shapes import scene_of
 from op_checks import generator, unit
-
 from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.fields.light import panorama_directions
-from splitnerf.ops import monte_carlo_light, prefilter_light, light_queries, shade_sums, split_sum_shade
+from splitnerf.ops import light_queries, monte_carlo_light, prefilter_light, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
 
 

@@ -16,11 +16,6 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from test_files import HOLDS
-from test_train import flat, same
-from tiny_runs import SMALL, as_options, lines_of, tiny, train
-from tqdm import tqdm
-
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.data.dataset import load_dataset
@@ -29,6 +24,10 @@ from splitnerf.progress import Interrupt, ended_by_signals
 from splitnerf.training import loop, state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
+from test_files import HOLDS
+from test_train import flat, same
+from tiny_runs import SMALL, as_options, lines_of, tiny, train
+from tqdm import tqdm
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
@@ -224,10 +223,14 @@ def test_a_run_in_use_is_refused(data, tmp_path, capsys):
     capsys.readouterr()
     try:
         for words in (
-            ["train", data, "--out", run, "--resume"], ["train", data, "--out", run, "--overwrite"],
-            ["train", data, "--out", run, "--resume", "auto"], ["demo", "--out", run, "--overwrite"], ["export", run],
-            ["evaluate", run, "--data", data], ["refine", run, "--data", data, "--out", run],
-        ):  # fmt: skip
+            ["train", data, "--out", run, "--resume"],
+            ["train", data, "--out", run, "--overwrite"],
+            ["train", data, "--out", run, "--resume", "auto"],
+            ["demo", "--out", run, "--overwrite"],
+            ["export", run],
+            ["evaluate", run, "--data", data],
+            ["refine", run, "--data", data, "--out", run],
+        ):
             assert main([str(word) for word in words]) == BAD_INPUT
             error = capsys.readouterr().err
             assert f"in use by pid {owner.pid} on " in error and len(error.splitlines()) == 1
@@ -245,12 +248,17 @@ def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, tmp_path, c
     assert train(data, run, "--steps", "4") == DONE
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for words in (
-        ["train", other_data, "--resume", "--steps", "9"], ["train", data, "--resume", "--set", "n_levels=5"],
-        ["train", data, "--resume", "--set", "grid_resolution=20"], ["train", data, "--overwrite", "--set", "no_such=1"],
-        ["train", data, "--overwrite", "--set", "box=0"], ["train", data / "none", "--overwrite"],
-        ["train", data, "--overwrite", "--downscale", "99"], ["demo", "--max-minutes", "-1", "--overwrite"],
-        ["demo", "--seed", "99999999999999999999", "--overwrite"], ["demo"],
-    ):  # fmt: skip
+        ["train", other_data, "--resume", "--steps", "9"],
+        ["train", data, "--resume", "--set", "n_levels=5"],
+        ["train", data, "--resume", "--set", "grid_resolution=20"],
+        ["train", data, "--overwrite", "--set", "no_such=1"],
+        ["train", data, "--overwrite", "--set", "box=0"],
+        ["train", data / "none", "--overwrite"],
+        ["train", data, "--overwrite", "--downscale", "99"],
+        ["demo", "--max-minutes", "-1", "--overwrite"],
+        ["demo", "--seed", "99999999999999999999", "--overwrite"],
+        ["demo"],
+    ):
         assert main([*map(str, words), "--out", str(run)]) == BAD_INPUT, words
         assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}, words
     assert "holds a run already" in capsys.readouterr().err
@@ -274,10 +282,12 @@ def test_data_are_not_replaced_by_results(data, begun, tmp_path, capsys, command
     run, folder = begun[0], Path(os.path.realpath(data))
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     words = {
-        "train": ["train", data, "--overwrite"], "demo": ["demo", "--overwrite"], "export": ["export", run],
+        "train": ["train", data, "--overwrite"],
+        "demo": ["demo", "--overwrite"],
+        "export": ["export", run],
         "refine": ["refine", run, "--data", data],
         "relight": ["relight", run / "mesh.glb", "--env", data / "light.hdr", "--overwrite"],
-    }[command]  # fmt: skip
+    }[command]
     if command == "relight":
         main(["export", str(run), "--formats", "glb", "--resolution", "32", "--texture-size", "16"])
     capsys.readouterr()
@@ -397,7 +407,12 @@ def started(*words: str) -> BaseProcess:
 @pytest.mark.parametrize("n_kills", [5, pytest.param(30, marks=pytest.mark.slow)])
 def test_kills_end_with_the_bits_of_an_unbroken_run(data, tmp_path, n_kills):
     """With -9 and at random moments: while it starts, trains, exports, in the refinement and in the scores."""
-    settings = SMALL | {"refinement.enabled": True, "refinement_sweeps": 2, "checkpoint_minutes": 0.0, "mesh_every": 0.2}
+    settings = SMALL | {
+        "refinement.enabled": True,
+        "refinement_sweeps": 2,
+        "checkpoint_minutes": 0.0,
+        "mesh_every": 0.2,
+    }
     words = ["train", str(data), "--steps", "40", "--deterministic", "--resume", "auto", *as_options(settings), "--out"]
 
     def state(run: Path) -> dict[str, object]:

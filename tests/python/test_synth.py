@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 import trimesh
-
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -119,8 +118,25 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
 @pytest.fixture(scope="module")
 def data(files):
     out = files / "data"
-    arguments = ["synth", files / "balls.glb", "--light", files / "sunny.exr", "--relight", files / "blue.exr",
-                 files / "sunny.exr", "--out", out, "--size", 40, "--train", 6, "--test", 3, "--spp", 384]  # fmt: skip
+    arguments = [
+        "synth",
+        files / "balls.glb",
+        "--light",
+        files / "sunny.exr",
+        "--relight",
+        files / "blue.exr",
+        files / "sunny.exr",
+        "--out",
+        out,
+        "--size",
+        40,
+        "--train",
+        6,
+        "--test",
+        3,
+        "--spp",
+        384,
+    ]
     assert main([str(a) for a in arguments]) == DONE
     return out
 
@@ -152,8 +168,20 @@ def test_normals_face_the_camera_and_the_sun_stands_at_plus_x(data):
 
 def test_an_asset_scores_as_perfect_on_its_own_data(data, tmp_path):
     out = tmp_path / "scores.json"
-    arguments = ["evaluate", data / "asset.glb", "--data", data, "--env", data / "light.hdr", "--spp", 384,
-                 "--out", out, "--sheet", tmp_path / "sheet.png"]  # fmt: skip
+    arguments = [
+        "evaluate",
+        data / "asset.glb",
+        "--data",
+        data,
+        "--env",
+        data / "light.hdr",
+        "--spp",
+        384,
+        "--out",
+        out,
+        "--sheet",
+        tmp_path / "sheet.png",
+    ]
     assert main([str(a) for a in arguments]) == DONE
     scores = json.loads(out.read_text())
     assert scores["relight"]["psnr"] > 40 and scores["novel_view"]["psnr"] > 40 and scores["albedo"]["psnr"] > 38

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
-from tiny_runs import lines_of, tiny, train
-
 from splitnerf.cli import BAD_INPUT
 from splitnerf.data.dataset import load_dataset
 from splitnerf.training.loop import Training
 from splitnerf.training.tensorboard import TensorBoard
+from tiny_runs import lines_of, tiny, train
 
 
 def test_scalars_and_previews_are_written(data, tmp_path):
@@ -37,7 +36,10 @@ def test_scalars_and_previews_are_written(data, tmp_path):
     (tag,) = read.Tags()["images"]
     assert [event.step for event in read.Images(tag)][:2] == [20, 40]
     (tmp_path / "shown.png").write_bytes(read.Images(tag)[0].encoded_image_string)
-    shown, saved = (np.asarray(Image.open(path).convert("RGB")) for path in (tmp_path / "shown.png", run / "previews/step_000020.png"))
+    shown, saved = (
+        np.asarray(Image.open(path).convert("RGB"))
+        for path in (tmp_path / "shown.png", run / "previews/step_000020.png")
+    )
     assert np.abs(shown.astype(int) - saved).max() <= 1
 
 
@@ -59,7 +61,9 @@ def test_a_full_disk_ends_the_curves_and_not_the_run(data, tmp_path, monkeypatch
 def test_without_the_package_one_line_says_what_to_install(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     assert train(data, tmp_path / "run", "--tensorboard", str(tmp_path / "board")) == BAD_INPUT
-    assert capsys.readouterr().err == "splitnerf: --tensorboard: needs tensorboard; pip install 'splitnerf[tensorboard]'\n"
+    assert (
+        capsys.readouterr().err == "splitnerf: --tensorboard: needs tensorboard; pip install 'splitnerf[tensorboard]'\n"
+    )
     assert not (tmp_path / "run").exists() and not (tmp_path / "board").exists()
 
 

@@ -15,7 +15,6 @@ import pytest
 from looking_at import SOURCES, look_at, needs_chromium, picture, serving
 from painted_ball import lamps, orange
 from PIL import Image
-
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
 from splitnerf.evaluate.metrics import psnr
@@ -49,7 +48,9 @@ def pictures(folder: Path, queries: list[str]) -> list[np.ndarray]:
         for i, query in enumerate(queries):
             path = folder / f"{i}.png"
             window = {"do": "size", "width": SIZE, "height": SIZE}
-            said = look_at(f"http://127.0.0.1:{server.server_port}/index.html?{query}", [window, {"do": "open"}, picture(path)])
+            said = look_at(
+                f"http://127.0.0.1:{server.server_port}/index.html?{query}", [window, {"do": "open"}, picture(path)]
+            )
             assert [line for line in said["console"] if line.startswith("error")] == []
             shown.append(np.asarray(Image.open(path).convert("RGB"), np.float32) / 255)
     return shown

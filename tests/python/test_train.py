@@ -9,31 +9,51 @@ import signal
 import numpy as np
 import pytest
 import torch
-from tiny_runs import SMALL, as_options, tiny, train
-
-from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
+from splitnerf.training.checkpoint import load_checkpoint
+from tiny_runs import SMALL, as_options, tiny, train
 
 
 def test_a_run_holds_every_file(data, tmp_path, capsys):
     run = tmp_path / "run"
     assert train(data, run, "--steps", "25") == DONE
-    for name in ("config.toml", "checkpoint.pt", "metrics.jsonl", "mesh.ply", "mesh.glb", "environment.exr",
-                 "environment.hdr", "evaluation.json", "report.html"):  # fmt: skip
+    for name in (
+        "config.toml",
+        "checkpoint.pt",
+        "metrics.jsonl",
+        "mesh.ply",
+        "mesh.glb",
+        "environment.exr",
+        "environment.hdr",
+        "evaluation.json",
+        "report.html",
+    ):
         assert (run / name).stat().st_size > 0, name
     assert list((run / "previews").glob("step_*.png"))
     evaluation = json.loads((run / "evaluation.json").read_text())
-    assert {"novel_view", "albedo", "relight", "normal_mae_deg", "roughness_mae", "metallic_balanced_accuracy",
-            "light_psnr", "chamfer", "f_score", "seconds"} <= set(evaluation)  # fmt: skip
+    assert {
+        "novel_view",
+        "albedo",
+        "relight",
+        "normal_mae_deg",
+        "roughness_mae",
+        "metallic_balanced_accuracy",
+        "light_psnr",
+        "chamfer",
+        "f_score",
+        "seconds",
+    } <= set(evaluation)
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     assert lines[-1]["step"] == 25 and all(np.isfinite(line["loss"]) for line in lines)
     said = capsys.readouterr().out
     assert "PSNR" in said and " s on the CPU\n" in said
 
 
-@pytest.mark.parametrize("settings", [{}, {"sparse_steps": True}, {"table_dtype": "bfloat16"},
-                                      {"sparse_steps": True, "table_dtype": "float16"}])  # fmt: skip
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"sparse_steps": True}, {"table_dtype": "bfloat16"}, {"sparse_steps": True, "table_dtype": "float16"}],
+)
 def test_the_error_falls_whatever_steps_and_tables(data, tmp_path, settings):
     """And the copy that is read is that of the table as it was trained."""
     from splitnerf.data.dataset import load_dataset
@@ -193,7 +213,11 @@ def test_evaluate_repeats_the_result_of_training(data_with_mesh, tmp_path):
     assert main(["evaluate", str(run), "--data", str(data)]) == DONE
     again = json.loads((run / "evaluation.json").read_text())
     assert again["novel_view"]["psnr"] == pytest.approx(first["novel_view"]["psnr"], abs=0.05)
-    assert first["chamfer"] > 0 and again["f_score"] == pytest.approx(first["f_score"], abs=1e-3) and again["relight"] is None
+    assert (
+        first["chamfer"] > 0
+        and again["f_score"] == pytest.approx(first["f_score"], abs=1e-3)
+        and again["relight"] is None
+    )
     assert assets == {name: (run / name).stat().st_mtime_ns for name in assets}
     kept, other = (run / "evaluation.json").read_bytes(), tmp_path / "other.json"
     assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--out", str(other)]) == DONE
@@ -204,9 +228,19 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
     """The published widths and levels, with few samples: every one of its switches runs."""
     run = tmp_path / "run"
     settings = dict(
-        target_samples=2048, initial_rays=32, light_samples=128, light_queries=64, mesh_resolution=32, export_resolution=32,
-        grid_resolution=32, log2_table_size=14, mesh_every=0.3, preview_every=1.0, export_texture_size=64, export_faces=500,
-    )  # fmt: skip
+        target_samples=2048,
+        initial_rays=32,
+        light_samples=128,
+        light_queries=64,
+        mesh_resolution=32,
+        export_resolution=32,
+        grid_resolution=32,
+        log2_table_size=14,
+        mesh_every=0.3,
+        preview_every=1.0,
+        export_texture_size=64,
+        export_faces=500,
+    )
     command = ["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", "--downscale", "2"]
     assert main([*command, *as_options(settings)]) == DONE
     assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())

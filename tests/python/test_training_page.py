@@ -15,10 +15,6 @@ import numpy as np
 import pytest
 import torch
 from looking_at import keys, look_at, needs_chromium, picture, serving, text, wait
-from test_view_page import pixels
-from tiny_runs import tiny
-from viewer_server import triangle
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
@@ -31,12 +27,19 @@ from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import Handler, ViewServer
 from splitnerf_tools.view.training_asset import training_asset
+from test_view_page import pixels
+from tiny_runs import tiny
+from viewer_server import triangle
 
 pytestmark = needs_chromium
 RESTLESS = {"restless": True}
-PHASE, NUMBERS, LOST, SAID = (f"document.getElementById('{name}').textContent" for name in ("phase", "numbers", "lost", "said"))
+PHASE, NUMBERS, LOST, SAID = (
+    f"document.getElementById('{name}').textContent" for name in ("phase", "numbers", "lost", "said")
+)
 LOADED = "document.getElementById('said').textContent === ''"
-COLOURS = "new Set(document.querySelector('#chart canvas').getContext('2d').getImageData(0, 0, 200, 100).data).size > 20"
+COLOURS = (
+    "new Set(document.querySelector('#chart canvas').getContext('2d').getImageData(0, 0, 200, 100).data).size > 20"
+)
 
 
 def press(selector):
@@ -74,22 +77,42 @@ def walk(data, tmp_path_factory):
         thread = threading.Thread(target=deliver)
         patch.setattr("splitnerf.progress.ending_signals", list)  # this thread has none
         thread.start()
-        told = look_at(server.url, [
-            {"do": "size", "width": 820, "height": 560} | RESTLESS, {"do": "open"} | RESTLESS,
-            wait(f"{LOADED} && !!document.querySelector('#chart canvas')"), lambda: versions.append(live.shown.sources[0].version),
-            {"do": "focus", "selector": "#checkpoint"} | RESTLESS, keys("Enter")[0] | RESTLESS, wait(f"{NUMBERS}.includes('saved')"),
-            text("saved", NUMBERS, **RESTLESS),
-            press("#pause"), wait(f"{PHASE}.includes('paused')"), lambda: versions.append(live.shown.sources[0].version),
-            picture(run.parent / "paused.png", **RESTLESS), text("curve", COLOURS, **RESTLESS),
-            text("button", "document.getElementById('pause').textContent", **RESTLESS),
-            {"do": "size", "width": 380, "height": 700} | RESTLESS, picture(run.parent / "narrow.png", **RESTLESS),
-            text("overflow", "document.documentElement.scrollWidth - innerWidth", **RESTLESS),
-            text("panel", "document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth", **RESTLESS),
-            press("#pause"), wait(f"!{PHASE}.includes('paused')"),
-            press("#stop"), wait(f"{PHASE}.includes('final') && {LOADED}"), text("buttons", "document.getElementById('buttons').hidden", **RESTLESS),
-            lambda: threading.Thread(target=live.events.end, args=("the run is done",)).start(),
-            wait(f"{LOST}.includes('The end')"), picture(run.parent / "ended.png", **RESTLESS), text("ended", LOST, **RESTLESS),
-        ])  # fmt: skip
+        told = look_at(
+            server.url,
+            [
+                {"do": "size", "width": 820, "height": 560} | RESTLESS,
+                {"do": "open"} | RESTLESS,
+                wait(f"{LOADED} && !!document.querySelector('#chart canvas')"),
+                lambda: versions.append(live.shown.sources[0].version),
+                {"do": "focus", "selector": "#checkpoint"} | RESTLESS,
+                keys("Enter")[0] | RESTLESS,
+                wait(f"{NUMBERS}.includes('saved')"),
+                text("saved", NUMBERS, **RESTLESS),
+                press("#pause"),
+                wait(f"{PHASE}.includes('paused')"),
+                lambda: versions.append(live.shown.sources[0].version),
+                picture(run.parent / "paused.png", **RESTLESS),
+                text("curve", COLOURS, **RESTLESS),
+                text("button", "document.getElementById('pause').textContent", **RESTLESS),
+                {"do": "size", "width": 380, "height": 700} | RESTLESS,
+                picture(run.parent / "narrow.png", **RESTLESS),
+                text("overflow", "document.documentElement.scrollWidth - innerWidth", **RESTLESS),
+                text(
+                    "panel",
+                    "document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth",
+                    **RESTLESS,
+                ),
+                press("#pause"),
+                wait(f"!{PHASE}.includes('paused')"),
+                press("#stop"),
+                wait(f"{PHASE}.includes('final') && {LOADED}"),
+                text("buttons", "document.getElementById('buttons').hidden", **RESTLESS),
+                lambda: threading.Thread(target=live.events.end, args=("the run is done",)).start(),
+                wait(f"{LOST}.includes('The end')"),
+                picture(run.parent / "ended.png", **RESTLESS),
+                text("ended", LOST, **RESTLESS),
+            ],
+        )
         thread.join()
     return told["texts"], told["console"], versions, done[0], run
 
@@ -101,7 +124,9 @@ def test_the_page_of_a_run(walk):
     assert texts["button"] == "Resume" and texts["curve"] is True
     step = int(re.search(r"checkpoint of step ([\d,]+) saved", texts["saved"])[1].replace(",", ""))
     assert 0 < step <= trained.step
-    assert trained.finished and trained.step < 100_000 and load_checkpoint(run / "checkpoint.pt")["step"] == trained.step
+    assert (
+        trained.finished and trained.step < 100_000 and load_checkpoint(run / "checkpoint.pt")["step"] == trained.step
+    )
     assert texts["buttons"] is True and texts["ended"] == "The end: the run is done."
 
 
@@ -135,13 +160,25 @@ def test_a_cut_connection_is_said_and_mended(tmp_path, monkeypatch):
     first = start("token-of-this-test")
     port = first.server_address[1]
     with servers:
-        told = look_at(first.url, [
-            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, wait(LOADED),
-            cut, wait(f"{LOST}.includes('lost')"), text("lost", LOST, **RESTLESS), picture(tmp_path / "lost.png", **RESTLESS),
-            lambda: start("token-of-this-test", port), wait(f"{LOST} === ''"),
-            cut, wait(f"{LOST}.includes('lost')"), lambda: start("another-token", port), wait(f"{LOST}.includes('token')"),
-            text("other", LOST, **RESTLESS),
-        ])["texts"]  # fmt: skip
+        told = look_at(
+            first.url,
+            [
+                {"do": "size", "width": 500, "height": 400} | RESTLESS,
+                {"do": "open"} | RESTLESS,
+                wait(LOADED),
+                cut,
+                wait(f"{LOST}.includes('lost')"),
+                text("lost", LOST, **RESTLESS),
+                picture(tmp_path / "lost.png", **RESTLESS),
+                lambda: start("token-of-this-test", port),
+                wait(f"{LOST} === ''"),
+                cut,
+                wait(f"{LOST}.includes('lost')"),
+                lambda: start("another-token", port),
+                wait(f"{LOST}.includes('token')"),
+                text("other", LOST, **RESTLESS),
+            ],
+        )["texts"]
     assert told["lost"] == "The connection to splitnerf is lost; the page tries again. Does the command still run?"
     assert told["other"] == "the token is missing or wrong; open the address that splitnerf printed"
 
@@ -162,9 +199,16 @@ def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monke
 
     monkeypatch.setattr(Handler, "_asset", half)
     with serving(ViewServer(ViewedAssets([folder]))) as server:
-        told = look_at(server.url, [
-            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS), read.set, wait(LOADED),
-        ])["texts"]  # fmt: skip
+        told = look_at(
+            server.url,
+            [
+                {"do": "size", "width": 500, "height": 400} | RESTLESS,
+                {"do": "open"} | RESTLESS,
+                text("said", SAID, **RESTLESS),
+                read.set,
+                wait(LOADED),
+            ],
+        )["texts"]
     assert told["said"] == "the connection broke off; what was missing is asked for again once splitnerf answers"
     assert len(asked) == 2
 
@@ -180,19 +224,30 @@ def test_a_glb_of_200_megabytes_loads(tmp_path):
     normals = np.broadcast_to(np.float32([0, 0, 1]), vertices.shape).copy()
     noise = np.random.default_rng(0).random((6000, 6000, 3), np.float32)  # PNG cannot make it smaller
     asset = Asset(
-        "large", vertices, triangles, normals, np.zeros(len(triangles), np.int32), [Material(albedo_texture=noise)],
+        "large",
+        vertices,
+        triangles,
+        normals,
+        np.zeros(len(triangles), np.int32),
+        [Material(albedo_texture=noise)],
         uv=(0.5 + 0.5 * vertices[:, :2]).astype(np.float32),
-    )  # fmt: skip
+    )
     write_glb(tmp_path / "large.glb", asset)
     assert (tmp_path / "large.glb").stat().st_size > 200e6
     clock = time.monotonic()
     with serving(ViewServer(ViewedAssets([tmp_path / "large.glb"]))) as server:
         read, clock = time.monotonic() - clock, time.monotonic()
-        told = look_at(server.url, [
-            {"do": "size", "width": 400, "height": 300} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),
-            lambda: print(f"read in {read:.1f} s, in the page after {time.monotonic() - clock:.1f} s"),
-            text("heap", "Math.round(performance.memory.usedJSHeapSize / 1e6)", **RESTLESS), picture(tmp_path / "large.png", **RESTLESS),
-        ])  # fmt: skip
+        told = look_at(
+            server.url,
+            [
+                {"do": "size", "width": 400, "height": 300} | RESTLESS,
+                {"do": "open"} | RESTLESS,
+                text("said", SAID, **RESTLESS),
+                lambda: print(f"read in {read:.1f} s, in the page after {time.monotonic() - clock:.1f} s"),
+                text("heap", "Math.round(performance.memory.usedJSHeapSize / 1e6)", **RESTLESS),
+                picture(tmp_path / "large.png", **RESTLESS),
+            ],
+        )
     print(f"the page's memory of scripts: {told['texts']['heap']} MB")
     assert told["texts"]["said"] == ""
     assert np.ptp(pixels(tmp_path / "large.png")[100:200, 30:100].reshape(-1, 3), axis=0).max() > 0.1
@@ -203,7 +258,12 @@ def test_an_asset_without_a_light_is_shown(tmp_path):
     live = Live("mine")
     live(Event("export", path=tmp_path))
     with serving(ViewServer(live.shown, live=live)) as server:
-        told = look_at(server.url, [
-            {"do": "size", "width": 500, "height": 400} | RESTLESS, {"do": "open"} | RESTLESS, text("said", SAID, **RESTLESS),
-        ])["texts"]  # fmt: skip
+        told = look_at(
+            server.url,
+            [
+                {"do": "size", "width": 500, "height": 400} | RESTLESS,
+                {"do": "open"} | RESTLESS,
+                text("said", SAID, **RESTLESS),
+            ],
+        )["texts"]
     assert told["said"] == ""

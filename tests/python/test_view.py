@@ -16,8 +16,7 @@ from urllib.parse import quote, urlsplit
 
 import numpy as np
 import pytest
-from viewer_server import ask, camera_of, error_of, halves, numbered_sky, serving, triangle
-
+import splitnerf_tools.view
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.frames import read_frames
@@ -29,7 +28,7 @@ from splitnerf_tools.view import server as server_module
 from splitnerf_tools.view.assets import MOST_DROPPED, ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.final import Camera, Tracer
 from splitnerf_tools.view.server import ViewServer
-import splitnerf_tools.view
+from viewer_server import ask, camera_of, error_of, halves, numbered_sky, serving, triangle
 
 PAGE = Path(splitnerf_tools.view.__file__).parent
 
@@ -75,7 +74,9 @@ def test_what_is_damaged_beside_the_asset_becomes_a_line(shown_run, capsys):
 def test_every_request_needs_the_token(served):
     for path in ("", "scene.json", "assets/0", "x/scene.json", served.url[-10:] + "scene.json"):
         assert error_of(ask(served, path, token=False)) == (
-            403, "the token is missing or wrong; open the address that splitnerf printed")  # fmt: skip
+            403,
+            "the token is missing or wrong; open the address that splitnerf printed",
+        )
     assert ask(served, "lights", method="POST", body=b"x", token=False)[0] == 403
     with ViewServer(served.shown) as second:
         assert urlsplit(second.url).path != urlsplit(served.url).path and len(urlsplit(second.url).path) > 20
@@ -86,9 +87,23 @@ def test_other_hosts_and_origins_are_refused(served):
     for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"[::1]:{port}"):
         assert ask(served, "scene.json", Host=host)[0] == 200
         assert ask(served, "scene.json", Origin=f"http://{host}")[0] == 200
-    for host in (f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", "", f"127.0.0.1:{port}.evil.example", "[", "a:b"):
+    for host in (
+        f"evil.example:{port}",
+        "127.0.0.1",
+        f"127.0.0.1:{port + 1}",
+        "",
+        f"127.0.0.1:{port}.evil.example",
+        "[",
+        "a:b",
+    ):
         assert ask(served, "scene.json", Host=host)[0] == 403, host
-    for origin in ("null", "http://evil.example", f"https://127.0.0.1:{port}", f"http://evil.example:{port}", "http://127.0.0.1"):
+    for origin in (
+        "null",
+        "http://evil.example",
+        f"https://127.0.0.1:{port}",
+        f"http://evil.example:{port}",
+        "http://127.0.0.1",
+    ):
         assert ask(served, "lights?name=a.exr", method="POST", body=b"x", Origin=origin)[0] == 403, origin
 
 
@@ -103,8 +118,21 @@ def test_a_server_for_all_machines_answers_to_addresses_alone(shown_run):
 
 def test_no_other_file_is_served(shown_run, served):
     (shown_run / "secret.txt").write_text("secret")
-    paths = ("secret.txt", "../secret.txt", "assets/../../secret.txt", "assets/%2e%2e/secret.txt", "assets//etc/passwd", "assets/-1",
-             "assets/0/x", "assets/", "assets/1e0", "assets/٠", "lights/99999999999999", "page/package.json", "scene.json/x")  # fmt: skip
+    paths = (
+        "secret.txt",
+        "../secret.txt",
+        "assets/../../secret.txt",
+        "assets/%2e%2e/secret.txt",
+        "assets//etc/passwd",
+        "assets/-1",
+        "assets/0/x",
+        "assets/",
+        "assets/1e0",
+        "assets/٠",
+        "lights/99999999999999",
+        "page/package.json",
+        "scene.json/x",
+    )
     for path in paths:
         assert ask(served, quote(path, safe="/%"))[0] == 404, path
     assert ask(served, "assets/0", method="POST", body=b"")[0] == 404
@@ -113,7 +141,10 @@ def test_no_other_file_is_served(shown_run, served):
 
 def test_pages_are_told_to_load_nothing_from_elsewhere(served):
     headers = ask(served, "")[1]
-    assert headers["Content-Security-Policy"].startswith("default-src 'none'") and "http" not in headers["Content-Security-Policy"]
+    assert (
+        headers["Content-Security-Policy"].startswith("default-src 'none'")
+        and "http" not in headers["Content-Security-Policy"]
+    )
     assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
 
 
@@ -136,10 +167,15 @@ def test_a_dropped_light_is_read_and_served(served, suffix):
 def test_damaged_lights_are_refused_in_one_line(served, tmp_path):
     good = encode_image(numbered_sky(), ".exr", "light")
     cases = {
-        "cut.exr": good[:200], "text.hdr": b"hello", "empty.hdr": b"", "../../x\n.exr": good[:99], "photo.png": good, "none": good,
+        "cut.exr": good[:200],
+        "text.hdr": b"hello",
+        "empty.hdr": b"",
+        "../../x\n.exr": good[:99],
+        "photo.png": good,
+        "none": good,
         "square.exr": encode_image(np.ones((8, 8, 3), np.float32), ".exr", "light"),
         "black.exr": encode_image(np.zeros((8, 16, 3), np.float32), ".exr", "light"),
-    }  # fmt: skip
+    }
     for name, content in cases.items():
         status, line = error_of(drop(served, name, content))
         assert status == 422 and "\n" not in line and "/tmp" not in line and str(tmp_path) not in line, (name, line)
@@ -149,7 +185,9 @@ def test_damaged_lights_are_refused_in_one_line(served, tmp_path):
 def test_uploads_have_limits(served, monkeypatch):
     monkeypatch.setattr(server_module, "LARGEST_UPLOAD", 1 << 20)
     assert error_of(drop(served, "a.exr", b"x", Content_Length=str((1 << 20) + 1))) == (
-        413, "the file is larger than 1 MB; make it smaller")  # fmt: skip
+        413,
+        "the file is larger than 1 MB; make it smaller",
+    )
     for length in ("", "-1", "1e3", "9" * 40):
         assert drop(served, "a.exr", b"", Content_Length=length)[0] == 411, length
     good = encode_image(numbered_sky(), ".exr", "light")
@@ -241,13 +279,25 @@ def test_pictures_are_those_of_the_path_tracer(shown_run, monkeypatch):
             camera = camera_of(60, 40, turn=turn)
             pictures = streamed(server, **camera)
             assert [(asset, spp, picture.shape) for asset, spp, picture in pictures] == [
-                (0, 1, (13, 20, 4)), (0, 1, (40, 60, 4)), (0, 2, (40, 60, 4)), (0, 64, (40, 60, 4))]  # fmt: skip
+                (0, 1, (13, 20, 4)),
+                (0, 1, (40, 60, 4)),
+                (0, 2, (40, 60, 4)),
+                (0, 64, (40, 60, 4)),
+            ]
             expected = AssetRenderer(asset).render(
-                rotate_environment(numbered_sky(), turn), np.reshape(camera["pose"], (4, 4)), camera["intrinsics"], 60, 40, spp=256
-            )  # fmt: skip
+                rotate_environment(numbered_sky(), turn),
+                np.reshape(camera["pose"], (4, 4)),
+                camera["intrinsics"],
+                60,
+                40,
+                spp=256,
+            )
             small, first, _, best = (picture.astype(np.float32) for _, _, picture in pictures)
             assert 0.1 < expected["alpha"].mean() < 0.9
-            assert np.abs(best[..., 3] - expected["alpha"]).max() < 0.25 and np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
+            assert (
+                np.abs(best[..., 3] - expected["alpha"]).max() < 0.25
+                and np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
+            )
             inside = expected["alpha"] > 0.99
             truth = expected["radiance"][inside]
             assert best[inside, :3].mean(axis=0) == pytest.approx(truth.mean(axis=0), rel=0.03)
@@ -283,10 +333,21 @@ def test_a_newer_request_ends_the_one_before(shown_run, monkeypatch):
 def test_cameras_beyond_reason_are_refused(shown_run, served):
     good = camera_of(16, 16)
     for changes in (
-        {"width": 0}, {"width": 1 << 20}, {"width": 4000, "height": 4000}, {"intrinsics": [1, 1, 8]}, {"intrinsics": [0, 1, 8, 8]},
-        {"intrinsics": ["x", 1, 8, 8]}, {"pose": [0] * 16}, {"pose": [1] * 4}, {"pose": None}, {"lights": []}, {"lights": [7]},
-        {"turn": float("nan")}, {"turn": 1e9}, {"height": None},
-    ):  # fmt: skip
+        {"width": 0},
+        {"width": 1 << 20},
+        {"width": 4000, "height": 4000},
+        {"intrinsics": [1, 1, 8]},
+        {"intrinsics": [0, 1, 8, 8]},
+        {"intrinsics": ["x", 1, 8, 8]},
+        {"pose": [0] * 16},
+        {"pose": [1] * 4},
+        {"pose": None},
+        {"lights": []},
+        {"lights": [7]},
+        {"turn": float("nan")},
+        {"turn": 1e9},
+        {"height": None},
+    ):
         status, line = error_of(ask(served, "final", method="POST", body=json.dumps(good | changes).encode()))
         assert status == 422 and "\n" not in line, changes
     assert ask(served, "final", method="POST", body=b"{")[0] == 400
@@ -333,7 +394,10 @@ def test_a_port_in_use_and_a_foreign_address_are_refused(shown_run, capsys):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         line = refused(capsys, shown_run, "--port", port)
-        assert line == f"splitnerf: 127.0.0.1, port {port}: cannot be listened at (Address already in use); give another --host or --port"
+        assert (
+            line
+            == f"splitnerf: 127.0.0.1, port {port}: cannot be listened at (Address already in use); give another --host or --port"
+        )
     assert "give another --host" in refused(capsys, shown_run, "--host", "192.0.2.1")
     assert "give another --host" in refused(capsys, shown_run, "--host", "no.such.host.invalid")
 
@@ -364,5 +428,3 @@ def test_a_signal_ends_it_in_peace(shown_run, number):
         process.send_signal(number)
         assert process.wait(60) == DONE
         assert process.stderr.read() == ""
-
-

@@ -12,12 +12,11 @@ from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
 import pytest
-from viewer_server import ask, camera_of, serving
-
 from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
 from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.final import Camera, Tracer
+from viewer_server import ask, camera_of, serving
 
 
 def silent(server) -> socket.socket:
@@ -34,7 +33,9 @@ def asking_for_pictures(server, **camera):
     """A page that has asked for pictures and has read the answer's first bytes."""
     body, path = json.dumps(camera).encode(), urlsplit(server.url).path
     with socket.create_connection(server.server_address, timeout=20) as page:
-        head = f"POST {path}final HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\nContent-Length: {len(body)}\r\n\r\n"
+        head = (
+            f"POST {path}final HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
         page.sendall(head.encode() + body)
         assert page.recv(12).startswith(b"HTTP/1.0 200")
         yield page

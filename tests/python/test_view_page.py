@@ -13,7 +13,6 @@ from looking_at import keys, look_at, needs_chromium, serving
 from looking_at import picture as picture_at
 from painted_ball import lamps, looking, with_textures
 from PIL import Image
-
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
 from splitnerf.export.glb import write_glb
@@ -25,7 +24,9 @@ from splitnerf_tools.view.server import ViewServer
 SIZE = 160
 TURN = 90
 CLICKED = 2  # the number of the photo whose camera is clicked
-BARE = "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
+BARE = (
+    "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
+)
 
 pytestmark = needs_chromium
 
@@ -64,24 +65,46 @@ def seen(run):
     said = {"do": "text", "script": "document.getElementById('said').textContent"}
     names = ("albedo", "roughness", "metallic", "normals")
     steps = [
-        {"do": "size", "width": 700, "height": 440}, {"do": "open"}, picture("whole"), said | {"name": "start"},
-        {"do": "style", "content": BARE}, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b"), picture("shaded"),
-        {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"),
+        {"do": "size", "width": 700, "height": 440},
+        {"do": "open"},
+        picture("whole"),
+        said | {"name": "start"},
+        {"do": "style", "content": BARE},
+        {"do": "size", "width": SIZE, "height": SIZE},
+        *keys("h", "b"),
+        picture("shaded"),
+        {"do": "set", "selector": "#turn", "value": TURN},
+        picture("turned"),
         {"do": "set", "selector": "#turn", "value": 0},
         *(step for i, name in enumerate(names) for step in (*keys(str(i + 2)), picture(name))),
         *keys("1"),
-        *keys("."), picture("brighter"), *keys(",", "t"), picture("aces"), *keys("t"),
-        *keys("ArrowLeft", "ArrowUp", "-"), picture("moved"),
-        {"do": "text", "name": "home", "script": "document.getElementById('home').click()"}, picture("home"),
-        {"do": "drag", "from": [80, 80], "to": [110, 80]}, picture("dragged"), *keys("r"),
-        {"do": "drop", "path": str(folder / "red.hdr")}, picture("red"),
+        *keys("."),
+        picture("brighter"),
+        *keys(",", "t"),
+        picture("aces"),
+        *keys("t"),
+        *keys("ArrowLeft", "ArrowUp", "-"),
+        picture("moved"),
+        {"do": "text", "name": "home", "script": "document.getElementById('home').click()"},
+        picture("home"),
+        {"do": "drag", "from": [80, 80], "to": [110, 80]},
+        picture("dragged"),
+        *keys("r"),
+        {"do": "drop", "path": str(folder / "red.hdr")},
+        picture("red"),
         {"do": "text", "name": "light", "script": "document.querySelector('#light option:checked').textContent"},
-        {"do": "drop", "path": str(folder / "cut.exr")}, picture("kept"), said | {"name": "damaged"},
-        *keys("b"), {"do": "set", "selector": "#blur", "value": 0}, picture("background"),
-        *keys("h"), {"do": "size", "width": 340, "height": 600}, picture("narrow"),
+        {"do": "drop", "path": str(folder / "cut.exr")},
+        picture("kept"),
+        said | {"name": "damaged"},
+        *keys("b"),
+        {"do": "set", "selector": "#blur", "value": 0},
+        picture("background"),
+        *keys("h"),
+        {"do": "size", "width": 340, "height": 600},
+        picture("narrow"),
         {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
         {"do": "text", "name": "stage", "script": "[canvas.clientWidth, canvas.clientHeight]"},
-    ]  # fmt: skip
+    ]
     told = look(ViewedAssets([run]), steps)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
@@ -133,15 +156,37 @@ def through(run, photos):
     bare = {"do": "style", "content": BARE + "#split-row { display: none !important }"}
     chosen = {"do": "text", "script": "document.getElementById('through').selectedOptions[0].textContent"}
     steps = [
-        {"do": "size", "width": 700, "height": 440}, {"do": "open"}, *keys("n"), picture("whole"), *keys("r"),
-        bare, {"do": "size", "width": SIZE, "height": SIZE}, *keys("h", "b", "n", "n"), split(100), picture("photo"),
-        split(0), picture("render"), *keys("5"), picture("outline"), *keys("1"), chosen | {"name": "second"},
-        {"do": "drag", "from": [80, 80], "to": [82, 80]}, chosen | {"name": "left"}, *keys("r"),
-        *keys("c", "-", "-", "-", "-", "-", "-", "-", "-"), picture("frusta"),
-        {"do": "click", "x": x, "y": y}, chosen | {"name": "clicked"},
-        *keys("r", "c", "f"), picture("final"), {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
-        {"do": "set", "selector": "#turn", "value": TURN}, picture("turned"), *keys("f"), picture("again"),
-    ]  # fmt: skip
+        {"do": "size", "width": 700, "height": 440},
+        {"do": "open"},
+        *keys("n"),
+        picture("whole"),
+        *keys("r"),
+        bare,
+        {"do": "size", "width": SIZE, "height": SIZE},
+        *keys("h", "b", "n", "n"),
+        split(100),
+        picture("photo"),
+        split(0),
+        picture("render"),
+        *keys("5"),
+        picture("outline"),
+        *keys("1"),
+        chosen | {"name": "second"},
+        {"do": "drag", "from": [80, 80], "to": [82, 80]},
+        chosen | {"name": "left"},
+        *keys("r"),
+        *keys("c", "-", "-", "-", "-", "-", "-", "-", "-"),
+        picture("frusta"),
+        {"do": "click", "x": x, "y": y},
+        chosen | {"name": "clicked"},
+        *keys("r", "c", "f"),
+        picture("final"),
+        {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
+        {"do": "set", "selector": "#turn", "value": TURN},
+        picture("turned"),
+        *keys("f"),
+        picture("again"),
+    ]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("splitnerf_tools.view.final.PASSES", (1, 1, 30))
         told = look(ViewedAssets([run]), steps, photos)
@@ -271,11 +316,14 @@ def test_two_assets_stand_side_by_side(run, ball, tmp_path):
     dark = np.full((64, 64, 3), 0.02, np.float32)
     write_glb(tmp_path / "dark.glb", with_textures(ball, albedo_texture=dark))
     steps = [
-        {"do": "size", "width": 2 * SIZE, "height": SIZE}, {"do": "open"},
+        {"do": "size", "width": 2 * SIZE, "height": SIZE},
+        {"do": "open"},
         {"do": "text", "name": "names", "script": "document.getElementById('names').innerText"},
-        {"do": "style", "content": BARE}, {"do": "key", "key": "h"}, {"do": "key", "key": "2"},
+        {"do": "style", "content": BARE},
+        {"do": "key", "key": "h"},
+        {"do": "key", "key": "2"},
         {"do": "picture", "path": str(tmp_path / "two.png")},
-    ]  # fmt: skip
+    ]
     told = look(ViewedAssets([run, tmp_path / "dark.glb"]), steps)
     picture = pixels(tmp_path / "two.png")
     assert told["texts"]["names"].split() == ["mine", "dark.glb"]

@@ -7,14 +7,13 @@ import math
 import pytest
 import torch
 from op_checks import generator, unit
-from tiny_runs import tiny
-
 from splitnerf.config import preset
 from splitnerf.fields import EvaluatedLight, Occlusion, RaySegments
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step
+from tiny_runs import tiny
 
 RADIUS, SIZE = 0.6, 24
 POSE = torch.tensor([[0.0, 0, 1, 4], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from +x towards the origin, z up
@@ -38,7 +37,15 @@ class Given(torch.nn.Module):
 def ball(**settings: object) -> tuple[SceneModel, torch.Tensor]:
     """A model whose field is a ball, nearly, under constant light of 1, and its cells."""
     torch.manual_seed(0)
-    model = SceneModel(tiny(start_levels=4, **{"constants.surface_width": 512}, sphere_radius=RADIUS, **{"shading.method": "split"}, **settings))
+    model = SceneModel(
+        tiny(
+            start_levels=4,
+            **{"constants.surface_width": 512},
+            sphere_radius=RADIUS,
+            **{"shading.method": "split"},
+            **settings,
+        )
+    )
     with torch.no_grad():
         model.variance.fill_(0.5)
         model.light.texels.zero_()
@@ -56,9 +63,13 @@ def test_samples_are_as_long_as_the_density_is_wide_within_bounds(s, length):
 def test_each_map_of_a_view_shows_what_it_is_called():
     model, cells = ball(occlusion_channels=3)
     colour = torch.tensor([0.2, 0.4, 0.7])
-    model.material = Given(lambda x, *_: (colour.expand(len(x), 3), torch.full((len(x), 1), 0.3), torch.full((len(x), 1), 0.6)))
+    model.material = Given(
+        lambda x, *_: (colour.expand(len(x), 3), torch.full((len(x), 1), 0.3), torch.full((len(x), 1), 0.6))
+    )
     share = torch.tensor([0.7, 0.8, 0.9])
-    model.occlusion = Given(lambda query, _: Occlusion(share.expand(len(query.normals), 3), 0.5 * share.expand(len(query.normals), 3)))
+    model.occlusion = Given(
+        lambda query, _: Occlusion(share.expand(len(query.normals), 3), 0.5 * share.expand(len(query.normals), 3))
+    )
     maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
     inside = maps["alpha"] > 0.01
     assert 0.1 < inside.float().mean() < 0.9
@@ -68,7 +79,11 @@ def test_each_map_of_a_view_shows_what_it_is_called():
     torch.testing.assert_close(maps["normal"][inside].norm(dim=1), torch.ones(int(inside.sum())))
     # x to the viewer, y to the right, z up
     row, column = 12, 12
-    assert maps["normal"][row, column, 0] > 0.9 and maps["normal"][row, column + 4, 1] > 0.2 and maps["normal"][row - 4, column, 2] > 0.2
+    assert (
+        maps["normal"][row, column, 0] > 0.9
+        and maps["normal"][row, column + 4, 1] > 0.2
+        and maps["normal"][row - 4, column, 2] > 0.2
+    )
     assert (maps["rgb"] >= 0).all() and (maps["rgb"] <= 1).all()
 
 
@@ -90,7 +105,9 @@ def test_maps_are_means_by_what_their_samples_weigh():
     """Roughness that rises along the ray: the mean over the samples by their shares of the colour."""
     model, cells = ball(shades_per_ray=0)
     model.head_inputs = lambda positions, outputs, features: [positions]
-    model.material = Given(lambda x, *_: (torch.full((len(x), 3), 0.5), torch.sigmoid(20 * (x[:, :1] - RADIUS)), torch.zeros(len(x), 1)))
+    model.material = Given(
+        lambda x, *_: (torch.full((len(x), 3), 0.5), torch.sigmoid(20 * (x[:, :1] - RADIUS)), torch.zeros(len(x), 1))
+    )
     maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
     rays = torch.tensor([[4.0, 0, 0]]), unit(torch.tensor([[-40.0, 0.5, -0.5]])), torch.tensor([0.5])
     ray = render_rays(model, model.evaluate_light(), find_samples(model, cells, *rays))
@@ -184,37 +201,70 @@ def test_a_model_begins_as_it_is_set():
         models.append(SceneModel(config))
         inputs = torch.zeros(1, models[-1].material.net[0].in_features)
         _, found, metallic = models[-1].material(inputs)
-        assert found.item() == pytest.approx(roughness, abs=1e-5) and metallic.item() == pytest.approx(1 / (1 + math.exp(2)))
+        assert found.item() == pytest.approx(roughness, abs=1e-5) and metallic.item() == pytest.approx(
+            1 / (1 + math.exp(2))
+        )
         with torch.no_grad():
             models[-1].material.net[-1].bias.fill_(-50.0)
         assert models[-1].material(inputs)[1].item() == pytest.approx(0.2)
         assert models[-1].s_value == pytest.approx(math.exp(4.5), rel=1e-5)
     points = torch.rand(20, 3)
-    torch.testing.assert_close(models[0].sdf_field.sdf(points) - models[1].sdf_field.sdf(points), torch.full((20,), 0.2))
+    torch.testing.assert_close(
+        models[0].sdf_field.sdf(points) - models[1].sdf_field.sdf(points), torch.full((20,), 0.2)
+    )
     torch.manual_seed(0)
     assert SceneModel(tiny(table_dtype="float16")).sdf_field.grid.stored().dtype == torch.float16
 
 
 def test_parts_are_as_large_as_they_are_set():
     settings = {
-        "n_levels": 3, "base_resolution": 5, "growth": 1.7, "log2_table_size": 9, "surface_width": 24, "box": 1.3,
-        "materials_width": 20, "light.kind": "mlp", "light_width": 12, "light_layers": 4, "direction_frequencies": 5,
-        "roughness_frequencies": 2, "light_activation": "exp", "occlusion.kind": "mlp", "occlusion_width": 18,
-        "occlusion.channels": 3, "directional": False,
-    }  # fmt: skip
+        "n_levels": 3,
+        "base_resolution": 5,
+        "growth": 1.7,
+        "log2_table_size": 9,
+        "surface_width": 24,
+        "box": 1.3,
+        "materials_width": 20,
+        "light.kind": "mlp",
+        "light_width": 12,
+        "light_layers": 4,
+        "direction_frequencies": 5,
+        "roughness_frequencies": 2,
+        "light_activation": "exp",
+        "occlusion.kind": "mlp",
+        "occlusion_width": 18,
+        "occlusion.channels": 3,
+        "directional": False,
+    }
     for inputs, n_inputs in (("outputs", 13), ("grid", 13 + 3 + 6)):
         model = SceneModel(tiny(**{"shading.method": "split"}).replace(settings | {"materials.inputs": inputs}))
         spec = model.sdf_field.grid.spec
-        assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (3, 2, 5, 1.7, 9)
+        assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (
+            3,
+            2,
+            5,
+            1.7,
+            9,
+        )
         assert model.sdf_field.hidden_direction.shape == (24, 9) and model.sdf_field.out_direction.shape == (13, 24)
         assert model.sdf_field.box == 1.3
-        assert [tuple(p.shape) for p in model.material.net.parameters() if p.dim() == 2] == [(20, n_inputs), (20, 20), (5, 20)]
+        assert [tuple(p.shape) for p in model.material.net.parameters() if p.dim() == 2] == [
+            (20, n_inputs),
+            (20, 20),
+            (5, 20),
+        ]
         assert [tuple(p.shape) for p in model.light.hidden.parameters() if p.dim() == 2] == [(12, 34)] + [(12, 12)] * 3
         assert len(model.light.roughness_scales) == 2 and model.light.activation == "exp"
-        assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [(18, n_inputs), (18, 18), (6, 18)]
+        assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [
+            (18, n_inputs),
+            (18, 18),
+            (6, 18),
+        ]
         assert not model.occlusion.directional and model.variance.requires_grad
     assert SceneModel(tiny(light_resolution=32)).light.resolution == 32
-    nothing = SceneModel(tiny(**{"shading.method": "split"}).replace({"occlusion.kind": "off", "occlusion.channels": 3})).occlusion
+    nothing = SceneModel(
+        tiny(**{"shading.method": "split"}).replace({"occlusion.kind": "off", "occlusion.channels": 3})
+    ).occlusion
     assert nothing.n_channels == 3 and not nothing.needs_mesh
 
 

@@ -11,7 +11,6 @@ import trimesh
 from mesh_shapes import OFFSET, cache_of, corners, grid_mesh, lattice, scene_of
 from op_cases import cached_occlusion_inputs
 from op_checks import lib
-
 from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.ops import VisibilityCache, cached_occlusion, visibility_bits

@@ -10,12 +10,10 @@ import torch
 import trimesh
 from mesh_shapes import OFFSET, between, corners, grid_mesh, lattice, scene_of
 from op_checks import generator, unit
-from torch.nn import functional as F
-
-from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, RaySegments, VisibilityBits
-from splitnerf.fields import visibility
+from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, RaySegments, VisibilityBits, visibility
 from splitnerf.fields.light import lobe_roughness, panorama_directions
 from splitnerf.ops import VisibilityCache, cached_occlusion, light_queries
+from torch.nn import functional as F
 
 
 def dented() -> trimesh.Trimesh:

@@ -1,6 +1,6 @@
 """The walk of a training step: the Python files of the package that it goes through.
 
-    python tests/python/test_walk.py    lists them
+python tests/python/test_walk.py    lists them
 """
 
 from __future__ import annotations
@@ -11,12 +11,11 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-import torch
-from tiny_runs import tiny
-
 import splitnerf
+import torch
 from splitnerf.data.dataset import load_dataset
 from splitnerf.training.loop import Training
+from tiny_runs import tiny
 
 PACKAGE = Path(splitnerf.__file__).parent
 MOST = 20  # files beside those of splitnerf/ops/

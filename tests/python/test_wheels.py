@@ -55,10 +55,13 @@ def test_a_wheel_for_another_processor_is_compiled_and_named_for_it(build):
     version = f"{sys.version_info[0]}{sys.version_info[1]}"
     assert wheel.startswith("linux-aarch64 ")
     for setting in (
-        "CMAKE_SYSTEM_NAME=Linux", "CMAKE_SYSTEM_PROCESSOR=aarch64", "CMAKE_CXX_COMPILER=aarch64-linux-gnu-g++",
-        "CMAKE_FIND_ROOT_PATH=/other", "SPLITNERF_TORCH=/other/torch",
+        "CMAKE_SYSTEM_NAME=Linux",
+        "CMAKE_SYSTEM_PROCESSOR=aarch64",
+        "CMAKE_CXX_COMPILER=aarch64-linux-gnu-g++",
+        "CMAKE_FIND_ROOT_PATH=/other",
+        "SPLITNERF_TORCH=/other/torch",
         f"PYTHON_MODULE_EXTENSION=.cpython-{version}-aarch64-linux-gnu.so",
-    ):  # fmt: skip
+    ):
         assert f"-C cmake.define.{setting}" in wheel
     # The programs that build run on this machine.
     assert all(line.startswith("here ") for line in lines if line != wheel)

@@ -10,11 +10,23 @@ from splitnerf.config import Config, preset
 
 # A tenth of the default sizes and less; the method is that of the preset.
 SMALL = dict(
-    n_levels=4, log2_table_size=10, target_samples=512, initial_rays=64, grid_resolution=16, light_resolution=16,
-    light_samples=64, light_queries=16, eikonal_points=32, mesh_resolution=24, export_resolution=32,
-    export_faces=500, export_texture_size=64, cuda_graphs=False, **{"refinement.enabled": False},
+    n_levels=4,
+    log2_table_size=10,
+    target_samples=512,
+    initial_rays=64,
+    grid_resolution=16,
+    light_resolution=16,
+    light_samples=64,
+    light_queries=16,
+    eikonal_points=32,
+    mesh_resolution=24,
+    export_resolution=32,
+    export_faces=500,
+    export_texture_size=64,
+    cuda_graphs=False,
+    **{"refinement.enabled": False},
     **{"surface.start": "sphere"},
-)  # fmt: skip
+)
 
 
 def tiny(name: str = "cpu", **settings: object) -> Config:

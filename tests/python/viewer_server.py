@@ -10,9 +10,8 @@ import looking_at
 import numpy as np
 from gltf_builder import Gltf
 from painted_ball import looking
-
-from splitnerf_tools.view.server import ViewServer
 from splitnerf_tools.view.assets import ViewedAssets
+from splitnerf_tools.view.server import ViewServer
 
 
 def numbered_sky(height=8):
@@ -61,4 +60,11 @@ def camera_of(width, height, **changes):
     """A camera 3 above the triangle's plane that sees all of it, for JSON."""
     pose = looking(-np.pi / 2, 0.0) + np.array([[0, 0, 0, 0.4], [0, 0, 0, 0], [0, 0, 0, 0.4], [0, 0, 0, 0]])
     lens = [1.5 * width, 1.5 * width, width / 2, height / 2]
-    return {"pose": pose.ravel().tolist(), "intrinsics": lens, "width": width, "height": height, "turn": 0, "lights": [0]} | changes
+    return {
+        "pose": pose.ravel().tolist(),
+        "intrinsics": lens,
+        "width": width,
+        "height": height,
+        "turn": 0,
+        "lights": [0],
+    } | changes

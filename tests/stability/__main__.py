@@ -18,9 +18,7 @@ DONE, BROKEN, BAD_INPUT = 0, 1, 2
 def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="stability", description=__doc__.split("\n\n")[0])
     parser.add_argument("--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)")
-    parser.add_argument(
-        "--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated"
-    )
+    parser.add_argument("--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the inputs (default: 0)")
     parser.add_argument(
         "--out", type=Path, default=Path("docs/benchmarks"), metavar="DIR", help="default: docs/benchmarks"

@@ -87,8 +87,14 @@ def normalised(directions: np.ndarray, lengths: np.ndarray) -> list[list]:
 
 
 def layer(
-    positions: np.ndarray, grid: dict[str, list], hidden: list[list], out: list[list], biases: Rows, beta: int = 100, box: int = 1
-) -> dict[str, list]:  # fmt: skip
+    positions: np.ndarray,
+    grid: dict[str, list],
+    hidden: list[list],
+    out: list[list],
+    biases: Rows,
+    beta: int = 100,
+    box: int = 1,
+) -> dict[str, list]:
     """outputs = out softplus(a) + out_bias and d outputs[0] / d position by the chain rule."""
     inputs = vector(positions) + grid["features"]
     n = len(grid["features"])

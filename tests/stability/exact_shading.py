@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from splitnerf.ops import brdf_lut
 
 from stability.entry import Rows
 from stability.precise import mp, vector
-from splitnerf.ops import brdf_lut
 
 NODES = 31  # intervals of the table along both axes
 
@@ -56,7 +56,9 @@ def gain(f0, f1, f2, compensated: bool):
 
 def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     view, roughness, metallic = (
-        vector(row["view_dirs"]), mp.mpf(float(row["roughness"][0])), mp.mpf(float(row["metallic"][0])),
+        vector(row["view_dirs"]),
+        mp.mpf(float(row["roughness"][0])),
+        mp.mpf(float(row["metallic"][0])),
     )
     cosine = turned(vector(row["normals"]), view)[1]
     f1, f2, _, layer = table(cosine, roughness)
@@ -122,7 +124,9 @@ def light_sums(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
         shadowed = along * mp.sqrt(cosine**2 * (1 - a2) + a2) + cosine * mp.sqrt(along**2 * (1 - a2) + a2)
         lobe = density * along / (2 * shadowed)
         weights = {
-            "specular": lobe, "grazing": lobe * clipped(1 - dot(view, half), 0, 1) ** 5, "diffuse": along / mp.pi,
+            "specular": lobe,
+            "grazing": lobe * clipped(1 - dot(view, half), 0, 1) ** 5,
+            "diffuse": along / mp.pi,
             "dielectric": lobe * fresnel_dielectric(dot(view, half)),
         }
         for c, value in enumerate(vector(radiance)):

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import torch
-
 from splitnerf import ops
+from splitnerf.ops.hash_grid import rounded
+
 from stability import exact_fields
 from stability.cases import Draw
 from stability.entry import Entry, Rows
-from splitnerf.ops.hash_grid import rounded
 
 SPEC = ops.HashGridSpec(n_levels=6, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)
 WIDTH, OUTPUTS, BETA, BOX = 16, 5, 100.0, 1.0
@@ -62,8 +62,10 @@ def on_a_lattice(rows: Rows) -> Rows:
 def network() -> Rows:
     draw = Draw(5)
     return {
-        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(), "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
-        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH), "out_bias": draw.normal(OUTPUTS).float(),
+        "hidden": draw.normal(WIDTH, 3 + SPEC.n_outputs).float(),
+        "hidden_bias": 0.1 * draw.normal(WIDTH).float(),
+        "out": draw.normal(OUTPUTS, WIDTH).float() / math.sqrt(WIDTH),
+        "out_bias": draw.normal(OUTPUTS).float(),
     }
 
 
@@ -72,7 +74,9 @@ def learned() -> Rows:
     """The network as it is learned: directions of all lengths, and the lengths of rows."""
     draw, weights = Draw(6), network()
     lengths = {f"{name}_length": weights[name].norm(dim=1, keepdim=True) for name in ("hidden", "out")}
-    scaled = {name: (weights[name] * draw.logarithmic(1e-3, 1e3, len(weights[name]), 1)).float() for name in ("hidden", "out")}
+    scaled = {
+        name: (weights[name] * draw.logarithmic(1e-3, 1e3, len(weights[name]), 1)).float() for name in ("hidden", "out")
+    }
     return weights | lengths | scaled
 
 
@@ -90,9 +94,18 @@ def values(rows: Rows, shared: Rows) -> Rows:
 
 def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> Entry:
     return Entry(
-        name, draw=draw_positions, call=call, smooth=("positions",), smooth_shared=("table",),
-        shared={"table": grid()["table"].to(dtype).float()}, conditioned=True, bound=2e-6, gradient_bound=4e-6,
-        exact=exact, exact_bound=1e-14, reason=BY_CELL,
+        name,
+        draw=draw_positions,
+        call=call,
+        smooth=("positions",),
+        smooth_shared=("table",),
+        shared={"table": grid()["table"].to(dtype).float()},
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact,
+        exact_bound=1e-14,
+        reason=BY_CELL,
     )
 
 
@@ -104,14 +117,27 @@ ENTRIES = (
         for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
     ),
     Entry(
-        "sdf_field", draw=lambda draw, n: on_a_lattice({"positions": 2 * draw_positions(draw, n)["positions"] - 1}),
-        repair=on_a_lattice, call=field, smooth_shared=("table", *LEARNED), shared=learned() | grid(), conditioned=True,
-        bound=4e-6, exact=exact_fields.sdf_field, exact_bound=1e-11,
+        "sdf_field",
+        draw=lambda draw, n: on_a_lattice({"positions": 2 * draw_positions(draw, n)["positions"] - 1}),
+        repair=on_a_lattice,
+        call=field,
+        smooth_shared=("table", *LEARNED),
+        shared=learned() | grid(),
+        conditioned=True,
+        bound=4e-6,
+        exact=exact_fields.sdf_field,
+        exact_bound=1e-11,
         reason="sums of 15 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
     ),
     Entry(
-        "sdf_values", call=values, shared=network() | grid(), conditioned=True, bound=4e-6,
-        exact=exact_fields.sdf_values, exact_bound=1e-11, reason="the two above",
+        "sdf_values",
+        call=values,
+        shared=network() | grid(),
+        conditioned=True,
+        bound=4e-6,
+        exact=exact_fields.sdf_values,
+        exact_bound=1e-11,
+        reason="the two above",
         draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
         repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},
     ),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import torch
+from splitnerf import ops
 from torch import Tensor
 
-from splitnerf import ops
 from stability import exact_light
 from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
@@ -99,27 +99,64 @@ def products(rows: Rows, shared: Rows) -> Rows:
 
 ENTRIES = (
     Entry(
-        "prefilter_light", draw=draw_queries, call=filtered, smooth_shared=("light",), shared=lamps(), repair=repaired,
-        conditioned=True, bound=4e-6, gradient_bound=1e-5, floor=1e-22, exact=exact_light.prefilter_light,
-        exact_bound=1e-13, size=1,
+        "prefilter_light",
+        draw=draw_queries,
+        call=filtered,
+        smooth_shared=("light",),
+        shared=lamps(),
+        repair=repaired,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=1e-5,
+        floor=1e-22,
+        exact=exact_light.prefilter_light,
+        exact_bound=1e-13,
+        size=1,
         reason="a few roundings and the sum over the lights; weights go down to 1e-16: light below 1e-22 underflows",
     ),
     Entry(
-        "prefilter_light, 1e30", draw=draw_queries, call=filtered, smooth_shared=("light",), shared=bright(1e30),
-        repair=repaired, conditioned=True, bound=4e-6, gradient_bound=1e-5,
-        reason="as above; a constant light stays itself", exact=exact_light.prefilter_light, exact_bound=1e-13,
+        "prefilter_light, 1e30",
+        draw=draw_queries,
+        call=filtered,
+        smooth_shared=("light",),
+        shared=bright(1e30),
+        repair=repaired,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=1e-5,
+        reason="as above; a constant light stays itself",
+        exact=exact_light.prefilter_light,
+        exact_bound=1e-13,
     ),
     Entry(
-        "light_lookup", draw=draw_lookup, call=looked_up, smooth=("directions", "roughness"),
-        smooth_shared=("levels", "sh"), shared=pyramid(), repair=repaired_lookup, vectors=("directions",),
-        conditioned=True, bound=4e-6, gradient_bound=2e-5, floor=1e-6, gradient_floor=1e-3,
-        exact=exact_light.light_lookup, exact_bound=1e-13,
+        "light_lookup",
+        draw=draw_lookup,
+        call=looked_up,
+        smooth=("directions", "roughness"),
+        smooth_shared=("levels", "sh"),
+        shared=pyramid(),
+        repair=repaired_lookup,
+        vectors=("directions",),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=2e-5,
+        floor=1e-6,
+        gradient_floor=1e-3,
+        exact=exact_light.light_lookup,
+        exact_bound=1e-13,
         reason="a few roundings, sums of 169 harmonics; radiance below a millionth of the mean light counts as that; "
         "a direction is known to a rounding of its length",
     ),
     Entry(
-        "sparse_product", call=products, smooth=("values",), conditioned=True, bound=2e-6, gradient_bound=2e-6, size=64,
-        draw=lambda draw, n: {"values": draw.radiance(n, 64, 3, top=1e30)}, chunk=512,
+        "sparse_product",
+        call=products,
+        smooth=("values",),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=2e-6,
+        size=64,
+        draw=lambda draw, n: {"values": draw.radiance(n, 64, 3, top=1e30)},
+        chunk=512,
         reason="sums of 64 weighted terms in four parts",
     ),
 )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import torch
+from splitnerf import ops
 from torch import Tensor
 
-from splitnerf import ops
 from stability import exact_losses
 from stability.cases import Draw
 from stability.entry import Entry, Rows
@@ -32,8 +32,10 @@ def draw_pixels(draw: Draw, n: int) -> Rows:
     target = draw.mixed((0.0, 254 / 255, 1.0), draw.uniform(n, BATCH, 4)).clamp(0, 1)
     return {
         "mean": draw.radiance(n, BATCH, 3, top=1e6),
-        "opacity": draw.mixed((0.0, 1e-7, 1e-3, 1 - 1e-3, 1.0), draw.uniform(n, BATCH)), "target": target,
-        "background": draw.shares(n, BATCH, 3), "whole": draw.chance(0.3, n, BATCH),
+        "opacity": draw.mixed((0.0, 1e-7, 1e-3, 1 - 1e-3, 1.0), draw.uniform(n, BATCH)),
+        "target": target,
+        "background": draw.shares(n, BATCH, 3),
+        "whole": draw.chance(0.3, n, BATCH),
     }
 
 
@@ -80,29 +82,71 @@ def draw_texels(draw: Draw, n: int) -> Rows:
 
 ENTRIES = (
     Entry(
-        "pixel_losses", draw=draw_pixels, call=pixels, smooth=("mean", "opacity"), repair=repaired_pixels,
-        conditioned=True, bound=4e-6, gradient_bound=8e-6, exact=exact_losses.pixel_losses, exact_bound=1e-13,
-        size=BATCH, chunk=256, floor=1e-12, gradient_floor=1e-9,
+        "pixel_losses",
+        draw=draw_pixels,
+        call=pixels,
+        smooth=("mean", "opacity"),
+        repair=repaired_pixels,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=8e-6,
+        exact=exact_losses.pixel_losses,
+        exact_bound=1e-13,
+        size=BATCH,
+        chunk=256,
+        floor=1e-12,
+        gradient_floor=1e-9,
         reason=BY_CONDITION + "; of colours in [0, 1] errors below 1e-6 count as that",
     ),
     Entry(
-        "gradient_losses", draw=draw_gradients, call=field_gradients, smooth=("gradients",), conditioned=True,
-        bound=4e-6, gradient_bound=8e-6, exact=exact_losses.gradient_losses, exact_bound=1e-13, size=BATCH, chunk=256,
-        floor=0.1, gradient_floor=0.1,
+        "gradient_losses",
+        draw=draw_gradients,
+        call=field_gradients,
+        smooth=("gradients",),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=8e-6,
+        exact=exact_losses.gradient_losses,
+        exact_bound=1e-13,
+        size=BATCH,
+        chunk=256,
+        floor=0.1,
+        gradient_floor=0.1,
         repair=lambda rows: {k: x.clamp(-1e6, 1e6) if k == "gradients" else x.clamp(0, 1) for k, x in rows.items()},
         reason=BY_CONDITION + "; of distances of unit vectors and of gradients of order 1 the error is absolute",
     ),
     Entry(
-        "quadratic_entropy", draw=draw_points, smooth=("x",), conditioned=True, bound=2e-6, gradient_bound=4e-6,
+        "quadratic_entropy",
+        draw=draw_points,
+        smooth=("x",),
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
         call=lambda rows, shared: batches(rows, ("x",), lambda x: (ops.quadratic_entropy(x),), ("entropy",)),
-        exact=exact_losses.quadratic_entropy, exact_bound=1e-13, size=POINTS, chunk=256, floor=1.0, gradient_floor=1e-3,
+        exact=exact_losses.quadratic_entropy,
+        exact_bound=1e-13,
+        size=POINTS,
+        chunk=256,
+        floor=1.0,
+        gradient_floor=1e-3,
         repair=lambda rows: {"x": rows["x"].clamp(-1e6, 1e6)},
         reason="the likeness of a pair is off by 2^-22 of itself; an entropy below 1 is a logarithm close to 0",
     ),
     Entry(
-        "light_prior", draw=draw_texels, smooth=("texels",), conditioned=True, bound=4e-6, gradient_bound=8e-6,
+        "light_prior",
+        draw=draw_texels,
+        smooth=("texels",),
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=8e-6,
         call=lambda rows, shared: batches(rows, ("texels",), lambda x: (ops.light_prior(x, LEVELS),), ("prior",)),
-        exact=exact_losses.light_prior, exact_bound=1e-13, size=POINTS, chunk=256, floor=1e-12, gradient_floor=1e-6,
-        repair=lambda rows: {"texels": rows["texels"].clamp(-1e3, 1e3)}, reason=BY_CONDITION,
+        exact=exact_losses.light_prior,
+        exact_bound=1e-13,
+        size=POINTS,
+        chunk=256,
+        floor=1e-12,
+        gradient_floor=1e-6,
+        repair=lambda rows: {"texels": rows["texels"].clamp(-1e3, 1e3)},
+        reason=BY_CONDITION,
     ),
 )

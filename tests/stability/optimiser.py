@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-
 from splitnerf.ops._library import lib
+
 from stability.cases import Draw
 from stability.entry import Entry, Rows
 from stability.precise import mp, vector
@@ -66,8 +66,15 @@ def exactly(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
 
 ENTRIES = (
     Entry(
-        "adamw_steps_", draw=draw_parameters, call=stepped, repair=repaired, conditioned=True, bound=1e-6,
-        exact=exactly, exact_bound=1e-13, floor=1e-24,
+        "adamw_steps_",
+        draw=draw_parameters,
+        call=stepped,
+        repair=repaired,
+        conditioned=True,
+        bound=1e-6,
+        exact=exactly,
+        exact_bound=1e-13,
+        floor=1e-24,
         reason="a few roundings of each term; below 1e-24 absolute: moments below 1e-38 lose digits, and eps divides them by 1e-15",
     ),
 )

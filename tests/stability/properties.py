@@ -12,15 +12,28 @@ from functools import lru_cache
 
 import numpy as np
 import torch
+from splitnerf import ops
 from torch import Tensor
 
-from splitnerf import ops
 from stability.cases import Draw, unit
 from stability.entry import Rows
 
 HALF = 0.75  # half the edge of the cube that is traced
 CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
-FACES = ((0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (2, 3, 7), (2, 7, 6), (0, 4, 7), (0, 7, 3), (1, 2, 6), (1, 6, 5))
+FACES = (
+    (0, 2, 1),
+    (0, 3, 2),
+    (4, 5, 6),
+    (4, 6, 7),
+    (0, 1, 5),
+    (0, 5, 4),
+    (2, 3, 7),
+    (2, 7, 6),
+    (0, 4, 7),
+    (0, 7, 3),
+    (1, 2, 6),
+    (1, 6, 5),
+)
 
 
 @dataclass(frozen=True)
@@ -92,9 +105,14 @@ def chequered() -> ops.TexturedSurface:
     side = unit(torch.linalg.cross(normals, torch.tensor([0.0, 0.0, 1.0]).expand(n, 3)))
     tilts = torch.stack([2 * black_and_white - 1, 1 - 2 * black_and_white.T, 0 * black_and_white], -1)
     return ops.TexturedSurface(
-        cube(), normals, torch.cat([side, torch.ones(n, 1)], 1), torch.tensor(CORNERS)[:, :2] * 0.7,
-        black_and_white[..., None].expand(4, 4, 3), torch.stack([black_and_white.T, black_and_white], -1), tilts,
-    )  # fmt: skip
+        cube(),
+        normals,
+        torch.cat([side, torch.ones(n, 1)], 1),
+        torch.tensor(CORNERS)[:, :2] * 0.7,
+        black_and_white[..., None].expand(4, 4, 3),
+        torch.stack([black_and_white.T, black_and_white], -1),
+        tilts,
+    )
 
 
 def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
@@ -105,10 +123,14 @@ def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     leaning = unit(geometric + draw.pick((0.0, 1e-7, 0.9, 3.0), n, 1) * draw.directions(n))
     normals = torch.where(draw.chance(0.1, n, 1), 0.0, leaning)
     rows = {
-        "positions": positions, "geometric_normals": geometric, "normals": normals,
-        "view_dirs": draw.at_cosine(normals), "albedo": draw.shares(n, 3), "roughness": draw.roughness(n),
+        "positions": positions,
+        "geometric_normals": geometric,
+        "normals": normals,
+        "view_dirs": draw.at_cosine(normals),
+        "albedo": draw.shares(n, 3),
+        "roughness": draw.roughness(n),
         "metallic": draw.shares(n, 1),
-    }  # fmt: skip
+    }
     rows = {name: x.float() for name, x in rows.items()}
     sky = torch.full((4, 8, 3), draw.pick((0.0, 1e-38, 1.0, 1e6), 1).item())
     sky[1, 2] = max(sky[0, 0, 0].item(), 1e6 if draw.chance(0.5, 1).item() else 0.0)
@@ -119,7 +141,9 @@ def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     wrong = ((length - 1).abs() > 2e-6) & (found.pdf > 0)
     lit = (found.visible > 0) | (found.sent > 0).any(-1)
     wrong |= lit & ((directions * geometric[:, None]).sum(-1) < -1e-6) | lit & (found.pdf <= 0)
-    wrong |= (found.visible > 0) & (found.sent > 0).any(-1) | (rows["normals"] == 0).all(1, keepdim=True) & (found.pdf > 0)
+    wrong |= (found.visible > 0) & (found.sent > 0).any(-1) | (rows["normals"] == 0).all(1, keepdim=True) & (
+        found.pdf > 0
+    )
     limits = ((found.pdf, 3e38), (found.sent, 1e9), (found.visible, 1.0))
     broken = torch.stack([finite_in(x, 0.0, limit) for x, limit in limits]).amax(0)
     broken = torch.where(wrong.any(1), 1.0, broken)
@@ -196,7 +220,9 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     directions = draw.directions(n)
     origins = targets - directions * draw.mixed((0.0, 1e-7, 1.0, 3.0, 1e4), draw.uniform(n, 1, high=4))
     rows = {
-        "rays_o": origins.float(), "rays_d": directions.float(), "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
+        "rays_o": origins.float(),
+        "rays_d": directions.float(),
+        "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
     }
     found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box, step, limit)
     ray, start = found.ray_indices, found.t_starts.double()
@@ -257,7 +283,9 @@ def read_photos(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     own = behind[(index - starts[run] + before[run]).clamp(0, len(behind) - 1)].double() / 255
     wrong = (exposure != exposures[view]).any(1) | (marked != inside)
     expected = torch.where(inside[:, None], own, random.double())
-    error = torch.cat([target.double() - words[index].double() / 65535, background.double() - expected], 1).abs().amax(1)
+    error = (
+        torch.cat([target.double() - words[index].double() / 65535, background.double() - expected], 1).abs().amax(1)
+    )
     return torch.where(wrong, 1.0, error - 1.2e-7), {"index": index, "random": random}
 
 
@@ -317,17 +345,27 @@ PROPERTIES = (
     Property("occlusion_factors", shares, "in [0, 1] under black, dim, bright and single lights", chunk=1024),
     Property("occlusion_factors, blocked", all_blocked, "0 where all rays are blocked, in black light too", chunk=1024),
     Property(
-        "incoming_light", light_arriving,
-        "finite, from above both horizons, and from the sky or the mesh alone; none into a closed body", size=8,
+        "incoming_light",
+        light_arriving,
+        "finite, from above both horizons, and from the sky or the mesh alone; none into a closed body",
+        size=8,
         chunk=1024,
     ),
     Property(
-        "visibility_bits", bits_apart, "open or blocked above the horizon, neither below; a convex body blocks nothing",
+        "visibility_bits",
+        bits_apart,
+        "open or blocked above the horizon, neither below; a convex body blocks nothing",
         chunk=1024,
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
-    Property("draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"),
-    Property("read_pixels", read_photos, "the value of its code, its photo's factors, its own colour behind it where it has one"),
+    Property(
+        "draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"
+    ),
+    Property(
+        "read_pixels",
+        read_photos,
+        "the value of its code, its photo's factors, its own colour behind it where it has one",
+    ),
     Property("light_queries, normals", queries_of_light, "normals that do not face away, with a roughness of 1"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 import torch
+from splitnerf import ops
 from torch import Tensor
 
-from splitnerf import ops
 from stability import exact_rays
 from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
@@ -79,22 +79,30 @@ def draw_surface(draw: Draw, n: int) -> Rows:
     gradient = draw.vectors(n * SAMPLES).reshape(n, SAMPLES, 3)
     near = unit(draw.normal(n, SAMPLES, 3)) * draw.uniform(n, SAMPLES, 1, low=0.8, high=1.2)
     return {
-        "sdf": sdf, "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient), "rays_d": draw.directions(n),
+        "sdf": sdf,
+        "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient),
+        "rays_d": draw.directions(n),
     }
 
 
 def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
     n = len(rows["sdf"])
     normals, w, opacity = ops.surface_weights(
-        rows["sdf"].flatten(), rows["gradient"].reshape(-1, 3), rows["rays_d"], shared["s"], offsets(n, SAMPLES),
-        step=STEP, anneal=anneal,
+        rows["sdf"].flatten(),
+        rows["gradient"].reshape(-1, 3),
+        rows["rays_d"],
+        shared["s"],
+        offsets(n, SAMPLES),
+        step=STEP,
+        anneal=anneal,
     )
     return {"normals": normals.reshape(n, SAMPLES, 3), "weights": w.reshape(n, SAMPLES), "opacity": opacity[:, None]}
 
 
 def repaired_surface(rows: Rows) -> Rows:
     return {
-        "sdf": rows["sdf"].clamp(-1, 1), "gradient": rows["gradient"].clamp(-1e6, 1e6),
+        "sdf": rows["sdf"].clamp(-1, 1),
+        "gradient": rows["gradient"].clamp(-1e6, 1e6),
         "rays_d": unit(rows["rays_d"].double()),
     }
 
@@ -126,46 +134,88 @@ def means(rows: Rows, shared: Rows) -> Rows:
 
 def ends_entry(name: str, s: float, draw, step: float, **changes) -> Entry:
     options = {
-        "bound": 4e-6, "gradient_bound": 8e-6, "floor": 1e-30, "gradient_floor": 1e-30 * s,
+        "bound": 4e-6,
+        "gradient_bound": 8e-6,
+        "floor": 1e-30,
+        "gradient_floor": 1e-30 * s,
         "exact": partial(exact_rays.weights_along_z, step=step),
     }
     return Entry(
-        name, draw=partial(draw, step=step), call=partial(weights, step=step), smooth=("sdf", "slope"),
-        smooth_shared=("s",), shared={"s": torch.tensor(s)}, conditioned=True, exact_bound=1e-13, reason=BY_DEPTH,
+        name,
+        draw=partial(draw, step=step),
+        call=partial(weights, step=step),
+        smooth=("sdf", "slope"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(s)},
+        conditioned=True,
+        exact_bound=1e-13,
+        reason=BY_DEPTH,
         **(options | changes),
     )
 
 
 def surface_entry(name: str, s: float, anneal: float) -> Entry:
     return Entry(
-        name, draw=draw_surface, call=partial(surface, anneal=anneal),
-        exact=partial(exact_rays.surface_weights, step=STEP, anneal=anneal), exact_bound=1e-12,
-        smooth=("sdf", "gradient"), smooth_shared=("s",), shared={"s": torch.tensor(s)}, repair=repaired_surface,
-        conditioned=True, bound=4e-6, gradient_bound=4e-4, floor=1.0, gradient_floor=1.0, size=SAMPLES,
+        name,
+        draw=draw_surface,
+        call=partial(surface, anneal=anneal),
+        exact=partial(exact_rays.surface_weights, step=STEP, anneal=anneal),
+        exact_bound=1e-12,
+        smooth=("sdf", "gradient"),
+        smooth_shared=("s",),
+        shared={"s": torch.tensor(s)},
+        repair=repaired_surface,
+        conditioned=True,
+        bound=4e-6,
+        gradient_bound=4e-4,
+        floor=1.0,
+        gradient_floor=1.0,
+        size=SAMPLES,
         reason=BY_NORMAL,
     )
 
 
 ENTRIES = (
-    surface_entry("surface_weights", 200.0, 1.0), ends_entry("surface_weights, any ends", 1.0, draw_ends, WIDEST),
+    surface_entry("surface_weights", 200.0, 1.0),
+    ends_entry("surface_weights, any ends", 1.0, draw_ends, WIDEST),
     ends_entry("surface_weights, any ends, s = 8000", 8000.0, partial(draw_ends, s=8000.0), WIDEST / 8000),
     ends_entry("surface_weights, 10^4 samples", 64.0, draw_long, 1.0, size=LONG, chunk=8, exact=None),
     surface_entry("surface_weights, annealed", 20.0, 0.3),
     Entry(
-        "composite", draw=partial(draw_composite, samples=SAMPLES), call=sums, smooth=("weights", "values"),
-        conditioned=True, bound=1e-6, gradient_bound=1e-6, exact=exact_rays.composite, exact_bound=1e-14,
+        "composite",
+        draw=partial(draw_composite, samples=SAMPLES),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        exact=exact_rays.composite,
+        exact_bound=1e-14,
         reason="sums in float64, rounded once; gradients are sums over the channels",
     ),
     Entry(
-        "composite, divided by the opacity", draw=draw_means, call=means, smooth=("weights", "values", "opacity"),
-        conditioned=True, bound=1e-6, gradient_bound=2e-6, exact=partial(exact_rays.composite_means, least=LEAST),
+        "composite, divided by the opacity",
+        draw=draw_means,
+        call=means,
+        smooth=("weights", "values", "opacity"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=2e-6,
+        exact=partial(exact_rays.composite_means, least=LEAST),
         exact_bound=1e-14,
         repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
         reason="a sum in float64 and one division",
     ),
     Entry(
-        "composite, 10^4 samples", draw=partial(draw_composite, samples=LONG), call=sums, smooth=("weights", "values"),
-        conditioned=True, bound=1e-6, gradient_bound=1e-6, size=LONG, chunk=8,
+        "composite, 10^4 samples",
+        draw=partial(draw_composite, samples=LONG),
+        call=sums,
+        smooth=("weights", "values"),
+        conditioned=True,
+        bound=1e-6,
+        gradient_bound=1e-6,
+        size=LONG,
+        chunk=8,
         reason="sums in float64, rounded once; gradients are sums over the channels",
     ),
 )

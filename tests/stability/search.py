@@ -128,8 +128,15 @@ def run(entry: Entry, cases: int, seed: int = 0, exact: int = KEPT) -> Result:
     double, single = exact_errors(entry, tally.worst["forward"], again) if entry.exact else (None, None)
     worst = {name: {k: x[:1] for k, x in kept.rows.items()} for name, kept in tally.worst.items()}
     return Result(
-        entry, tally.rows * entry.size, **tally.largest, shared=tally.shared, broken=tally.broken, exact=double,
-        single_exact=single, worst_forward=worst["forward"], worst_gradient=worst["gradient"],
+        entry,
+        tally.rows * entry.size,
+        **tally.largest,
+        shared=tally.shared,
+        broken=tally.broken,
+        exact=double,
+        single_exact=single,
+        worst_forward=worst["forward"],
+        worst_gradient=worst["gradient"],
     )
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import torch
+from reference import drawn_directions
+from splitnerf import ops
+from splitnerf.ops._library import lib
 from torch import Tensor
 
-from splitnerf import ops
 from stability import exact_shading
 from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
-from splitnerf.ops._library import lib
-from reference import drawn_directions
 
 UNITS = ("normals", "view_dirs", "light_dirs")
 IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d", "share")
@@ -54,8 +54,12 @@ def draw_material(draw: Draw, n: int) -> Rows:
 
 def draw_shaded(draw: Draw, n: int) -> Rows:
     return draw_material(draw, n) | {
-        "specular": draw.radiance(n, 3), "diffuse": draw.radiance(n, 3), "occlusion_s": draw.shares(n, 3),
-        "occlusion_d": draw.shares(n, 3), "indirect_s": draw.radiance(n, 3), "indirect_d": draw.radiance(n, 3),
+        "specular": draw.radiance(n, 3),
+        "diffuse": draw.radiance(n, 3),
+        "occlusion_s": draw.shares(n, 3),
+        "occlusion_d": draw.shares(n, 3),
+        "indirect_s": draw.radiance(n, 3),
+        "indirect_d": draw.radiance(n, 3),
     }
 
 
@@ -95,7 +99,11 @@ def shade_modes(rows: Rows, shared: Rows) -> Rows:
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
     given = [*(rows[name] for name in SHADED), torch.stack([rows[name] for name in ops.LightSums._fields], 1)]
-    modes = {"single": (False, None, None), "compensated": (True, None, None), "mixed": (True, rows["other"], rows["share"][:, 0])}
+    modes = {
+        "single": (False, None, None),
+        "compensated": (True, None, None),
+        "mixed": (True, rows["other"], rows["share"][:, 0]),
+    }
     return {name: lib.shade_sums(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
 
 
@@ -132,7 +140,8 @@ def sky(n: int) -> Rows:
     radiance[n // 2 :] = 0
     radiance[-1] = 1e6
     return {
-        "directions": unit(draw.normal(n, 3)).float(), "solid_angles": draw.uniform(n).float(),
+        "directions": unit(draw.normal(n, 3)).float(),
+        "solid_angles": draw.uniform(n).float(),
         "radiance": radiance.float(),
     }
 
@@ -149,43 +158,99 @@ def draw_srgb(draw: Draw, n: int) -> Rows:
 
 ENTRIES = (
     Entry(
-        "light_queries", draw=surface, call=directions, shared=TABLE, smooth=("normals", "roughness"), repair=repaired,
-        conditioned=True, bound=2e-6, gradient_bound=4e-6, exact=exact_shading.light_queries, exact_bound=1e-14,
+        "light_queries",
+        draw=surface,
+        call=directions,
+        shared=TABLE,
+        smooth=("normals", "roughness"),
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        gradient_bound=4e-6,
+        exact=exact_shading.light_queries,
+        exact_bound=1e-14,
         gradient_floor=1.0,
         reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
     ),
     Entry(
-        "split_sum_shade", draw=draw_shaded, call=shade_modes, shared=TABLE, repair=repaired, conditioned=True,
-        bound=2e-6, smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"), gradient_bound=4e-6,
-        exact=exact_shading.split_sum_shade, exact_bound=1e-14, reason=BY_CONDITION,
+        "split_sum_shade",
+        draw=draw_shaded,
+        call=shade_modes,
+        shared=TABLE,
+        repair=repaired,
+        conditioned=True,
+        bound=2e-6,
+        smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"),
+        gradient_bound=4e-6,
+        exact=exact_shading.split_sum_shade,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
     ),
     Entry(
-        "shade_sums", draw=draw_sums, call=shade_from_sums, shared=TABLE,
-        repair=lambda rows: within_the_light(repaired(rows)), conditioned=True, bound=2e-6,
-        smooth=(*SHADED, *ops.LightSums._fields, "other"), gradient_bound=4e-6, exact=exact_shading.shade_sums,
-        exact_bound=1e-14, reason=BY_CONDITION,
+        "shade_sums",
+        draw=draw_sums,
+        call=shade_from_sums,
+        shared=TABLE,
+        repair=lambda rows: within_the_light(repaired(rows)),
+        conditioned=True,
+        bound=2e-6,
+        smooth=(*SHADED, *ops.LightSums._fields, "other"),
+        gradient_bound=4e-6,
+        exact=exact_shading.shade_sums,
+        exact_bound=1e-14,
+        reason=BY_CONDITION,
     ),
     Entry(
-        "monte_carlo_light", draw=draw_lit, call=light_sums, repair=repaired, conditioned=True, bound=4e-6,
-        smooth=("normals", "roughness", "radiance"), gradient_bound=8e-6, exact=exact_shading.light_sums,
-        exact_bound=1e-14, floor=1e-10, size=SAMPLES, gradient_floor=1e-30,
+        "monte_carlo_light",
+        draw=draw_lit,
+        call=light_sums,
+        repair=repaired,
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness", "radiance"),
+        gradient_bound=8e-6,
+        exact=exact_shading.light_sums,
+        exact_bound=1e-14,
+        floor=1e-10,
+        size=SAMPLES,
+        gradient_floor=1e-30,
         reason=BY_CONDITION + "; gradients below 1e-30 come from light that has no normal float",
     ),
     Entry(
-        "summed_light", draw=draw_summed, call=summed, repair=repaired_summed, shared=sky(32), conditioned=True,
-        bound=4e-6, smooth=("normals", "roughness"), smooth_shared=("radiance",), gradient_bound=1e-5, size=32,
-        chunk=4096, reason=BY_CONDITION,
+        "summed_light",
+        draw=draw_summed,
+        call=summed,
+        repair=repaired_summed,
+        shared=sky(32),
+        conditioned=True,
+        bound=4e-6,
+        smooth=("normals", "roughness"),
+        smooth_shared=("radiance",),
+        gradient_bound=1e-5,
+        size=32,
+        chunk=4096,
+        reason=BY_CONDITION,
     ),
     Entry(
-        "linear_to_srgb", draw=draw_linear, smooth=("linear",), conditioned=True, exact=exact_shading.linear_to_srgb,
-        exact_bound=1e-14, call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])}, bound=1e-5,
+        "linear_to_srgb",
+        draw=draw_linear,
+        smooth=("linear",),
+        conditioned=True,
+        exact=exact_shading.linear_to_srgb,
+        exact_bound=1e-14,
+        call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])},
+        bound=1e-5,
         gradient_bound=1e-5,
         reason="x^(1/2.4): the float32 nearest to 1/2.4 is off by 4e-8, times ln x up to 90; its slope jumps once",
     ),
     Entry(
-        "srgb_to_linear", draw=draw_srgb, exact=exact_shading.srgb_to_linear, exact_bound=1e-14,
+        "srgb_to_linear",
+        draw=draw_srgb,
+        exact=exact_shading.srgb_to_linear,
+        exact_bound=1e-14,
         repair=lambda rows: {"srgb": rows["srgb"].clamp(0, 1e15)},
-        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])}, bound=4e-6,
+        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])},
+        bound=4e-6,
         reason="x^2.4: the float32 nearest to 2.4 is off by 9e-8, times ln x of up to 35, and 2.4 roundings of x",
     ),
 )

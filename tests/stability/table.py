@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from splitnerf.errors import InputError
 from splitnerf_tools.bench.charts import table as table_lines
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
+
 from stability import fields, light, losses, optimiser, properties, rays, shading
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify
 from stability.search import Result, run
-from splitnerf.errors import InputError
 
 ENTRIES: tuple[Entry, ...] = (
     shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES + optimiser.ENTRIES
@@ -21,9 +22,20 @@ PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 SOURCES = ("cpp", "python/splitnerf/ops")
 COLUMNS = (
-    "operator", "inputs", "worst forward", "promised", "worst gradient", "promised gradient", "without condition",
-    "gradient without condition", "gradient to shared", "float64 against exact", "float32 against exact", "not finite",
-    "holds", "reason",
+    "operator",
+    "inputs",
+    "worst forward",
+    "promised",
+    "worst gradient",
+    "promised gradient",
+    "without condition",
+    "gradient without condition",
+    "gradient to shared",
+    "float64 against exact",
+    "float32 against exact",
+    "not finite",
+    "holds",
+    "reason",
 )
 
 
@@ -72,11 +84,20 @@ def verdict_line(v: Verdict) -> str:
 
 def row_of(r: Result) -> list[str]:
     return [
-        r.entry.name, str(r.cases), number(r.forward), number(r.entry.bound),
-        number(r.gradient) if r.entry.smooth else "none", number(r.entry.gradient_bound) if r.entry.smooth else "none",
-        number(r.plain_forward), number(r.plain_gradient) if r.entry.smooth else "none",
-        number(r.shared) if r.entry.smooth_shared else "none", number(r.exact), number(r.single_exact), str(r.broken),
-        "yes" if r.holds else "NO", r.entry.reason,
+        r.entry.name,
+        str(r.cases),
+        number(r.forward),
+        number(r.entry.bound),
+        number(r.gradient) if r.entry.smooth else "none",
+        number(r.entry.gradient_bound) if r.entry.smooth else "none",
+        number(r.plain_forward),
+        number(r.plain_gradient) if r.entry.smooth else "none",
+        number(r.shared) if r.entry.smooth_shared else "none",
+        number(r.exact),
+        number(r.single_exact),
+        str(r.broken),
+        "yes" if r.holds else "NO",
+        r.entry.reason,
     ]
 
 

@@ -42,7 +42,9 @@ SPLITNERF_HD OpticalDepthGrad<T> neus_optical_depth_backward(T f_prev, T f_next,
 }
 
 // One sample of a ray: the distances at its two ends, and their difference.
-template <class T> struct NeusInterval { T f_prev, f_next, apart; };
+template <class T> struct NeusInterval {
+  T f_prev, f_next, apart;
+};
 template <class T> SPLITNERF_HD T neus_optical_depth(const NeusInterval<T>& interval, T s) {
   return neus_optical_depth(interval.f_prev, interval.f_next, interval.apart, s);
 }
@@ -131,7 +133,9 @@ template <class T> SPLITNERF_HD Vec3<T> unit_normal_backward(Vec3<T> gradient, V
 
 // Slope of the distance along the ray, never positive: relu(-c), or, while t < 1, in part relu(1/2 - c/2), so that
 // samples that face away keep a gradient early on.        Source: NeuS, the released code's cos_anneal_ratio.
-template <class T> struct AnnealedCosine { T value, slope; };
+template <class T> struct AnnealedCosine {
+  T value, slope;
+};
 template <class T> SPLITNERF_HD AnnealedCosine<T> annealed_cosine(T cosine, T t) {
   const T soft = T(0.5) - T(0.5) * cosine;  // a NaN goes on to the caller
   return {-((soft < T(0) ? T(0) : soft) * (T(1) - t) + (cosine > T(0) ? T(0) : -cosine) * t),

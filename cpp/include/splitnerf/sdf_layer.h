@@ -45,7 +45,9 @@ template <class T> struct SdfField {
 
 // What a field gives at n points: [n, n_outputs], [n, C] features of the grid, [n, 3] d first output / d position. The gradients
 // to them have the same shapes.
-template <class T> struct SdfOutputs { T *outputs, *features, *gradient; };
+template <class T> struct SdfOutputs {
+  T *outputs, *features, *gradient;
+};
 
 // Gradients to the numbers of a field whose rows have lengths, in their own shapes.
 template <class T> struct SdfFieldGrad {
@@ -69,7 +71,9 @@ template <class T> struct SdfPoints {
 };
 
 // Sums over points, laid out as in SdfLayer.
-template <class T> struct SdfLayerGrad { T *hidden, *hidden_bias, *out, *out_bias; };
+template <class T> struct SdfLayerGrad {
+  T *hidden, *hidden_bias, *out, *out_bias;
+};
 
 inline constexpr int kSdfBlock = 64;
 

@@ -232,8 +232,7 @@ template <class T> struct DielectricAlbedo {
   T rest;  // 1 - E, at least 0.01
   ScatteringGain<T> gain;
 };
-template <class T>
-SPLITNERF_HD DielectricAlbedo<T> dielectric_albedo(const LutSample<T>& table, bool compensate) {
+template <class T> SPLITNERF_HD DielectricAlbedo<T> dielectric_albedo(const LutSample<T>& table, bool compensate) {
   const ScatteringGain<T> gain = scattering_gain(T(kDielectricF0), table.lost, compensate);
   const T value = table.dielectric * gain.value;
   return {value, table.dielectric * (T(kDielectricF0) * gain.d_lost_over_fr), T(1) - value, gain};
@@ -301,8 +300,12 @@ SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, 
   const FresnelTerm<T> fr = fresnel_term(options.fresnel, normal_reflectance(metallic, albedo), roughness, n_dot_v);
   const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
   const T grad_fr = grad.specular * e.d_fr - grad.kept, grad_f0 = grad_fr * fr.d_f0;
-  return {grad_f0 * metallic,         grad_f0 * (albedo - T(kDielectricF0)), grad_fr * fr.d_roughness,
-          grad_fr * fr.d_n_dot_v,     grad.specular * e.d_f2,                grad.specular * e.d_lost,
+  return {grad_f0 * metallic,
+          grad_f0 * (albedo - T(kDielectricF0)),
+          grad_fr * fr.d_roughness,
+          grad_fr * fr.d_n_dot_v,
+          grad.specular * e.d_f2,
+          grad.specular * e.d_lost,
           T(0)};
 }
 
@@ -354,8 +357,8 @@ SPLITNERF_HD ShadePoint<T> split_sum_shade_backward(const float* lut, ShadeOptio
   // F2, lost, E_d = table(n.v, roughness)
   out.roughness += grad_f2 * table.d_roughness.y + grad_lost * table.lost_by_roughness +
                    grad_dielectric * table.dielectric_by_roughness;
-  grad_nv += grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v +
-             grad_dielectric * table.dielectric_by_n_dot_v;
+  grad_nv +=
+      grad_f2 * table.d_n_dot_v.y + grad_lost * table.lost_by_n_dot_v + grad_dielectric * table.dielectric_by_n_dot_v;
   out.normal = p.view * (sign * grad_nv);
   out.view = p.normal * (sign * grad_nv);
   return out;

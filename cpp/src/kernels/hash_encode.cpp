@@ -179,14 +179,12 @@ void hash_encode(const HashEncodeArgs<T>& args, int64_t begin, int64_t end, T* f
   });
 }
 
-template <class T>
-void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, T* grad_table) {
+template <class T> void hash_scatter(const HashEncodeArgs<T>& args, int level, const T* grad_features, T* grad_table) {
   with_features(args.n_features, [&](auto count) {
     constexpr int F = decltype(count)::n;
     const int64_t n_columns = int64_t(args.n_levels) * F;
     const auto load = [&](int64_t b, int64_t n, LevelGrads<T, F>& to) {
-      for (int64_t p = 0; p < n; ++p)
-        copy_entry<F>(grad_features + (b + p) * n_columns + level * F, to.value + p * F);
+      for (int64_t p = 0; p < n; ++p) copy_entry<F>(grad_features + (b + p) * n_columns + level * F, to.value + p * F);
     };
     scatter_level<F>(args, level, load, grad_table);
   });
@@ -212,9 +210,9 @@ void hash_scatter_along(const HashEncodeArgs<T>& args, int level, const LevelPla
   });
 }
 
-#define SPLITNERF_INSTANTIATE(T)                                                        \
-  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*);     \
-  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, T*);           \
+#define SPLITNERF_INSTANTIATE(T)                                                    \
+  template void hash_encode<T>(const HashEncodeArgs<T>&, int64_t, int64_t, T*, T*); \
+  template void hash_scatter<T>(const HashEncodeArgs<T>&, int, const T*, T*);       \
   template void hash_scatter_along<T>(const HashEncodeArgs<T>&, int, const LevelPlanes<const T>&, const T*, T*);
 SPLITNERF_INSTANTIATE(float)
 SPLITNERF_INSTANTIATE(double)

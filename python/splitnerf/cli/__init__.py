@@ -21,9 +21,7 @@ from splitnerf.files import reason
 from splitnerf.plugins import TITLES, installed
 from splitnerf.progress import ended_by_signals
 
-COMMANDS = {
-    "reconstruction": (train, refine), "results": (export, relight, evaluate), "this installation": (info,),
-}  # fmt: skip
+COMMANDS = {"reconstruction": (train, refine), "results": (export, relight, evaluate), "this installation": (info,)}
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 
@@ -34,9 +32,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"splitnerf {splitnerf.__version__}")
     parser.add_argument(
-        "--print-completion", action=PrintCompletion, choices=SHELLS, metavar="SHELL",
+        "--print-completion",
+        action=PrintCompletion,
+        choices=SHELLS,
+        metavar="SHELL",
         help=f"print the script that completes commands in a shell ({', '.join(SHELLS)})",
-    )  # fmt: skip
+    )
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
     groups = {}
     for title in TITLES:

@@ -11,7 +11,9 @@ SHELLS = ("bash", "zsh", "tcsh")
 class PrintCompletion(argparse.Action):
     """Prints the script that completes a parser's commands in a shell, and ends the program."""
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: object, shell: str, option: str | None = None) -> None:
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: object, shell: str, option: str | None = None
+    ) -> None:
         import shtab  # here: other commands need not load it
 
         complete_files(parser, shtab.FILE)

@@ -18,7 +18,8 @@ SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "evaluate", help="score runs or GLB files against the truth, and put the scores into a table",
+        "evaluate",
+        help="score runs or GLB files against the truth, and put the scores into a table",
         description="Path-traces the test views of DATA, of the asset that RUN's refinement fitted or of a GLB file (a RUN "
         "without refinement is rendered from its checkpoint), relights the asset under the data's maps, and writes "
         "evaluation.json and report.html into RUN (for a file FILE_evaluation.json next to it). Without --data it reads the "
@@ -28,7 +29,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf evaluate runs/a runs/b --table table.md",
             "splitnerf evaluate runs/a --data hotdog --protocol nerfactor --maps lights",
         ),
-    )  # fmt: skip
+    )
     parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
     parser.add_argument(
         "--data",
@@ -53,13 +54,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps",
     )
     parser.add_argument(
-        "--protocol", choices=SETS, metavar="SET",
+        "--protocol",
+        choices=SETS,
+        metavar="SET",
         help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--truth", type=Path, metavar="FOLDER",
+        "--truth",
+        type=Path,
+        metavar="FOLDER",
         help="for --protocol stanford-orb: the set's ground_truth, if it is elsewhere",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--maps",
         type=Path,
@@ -130,7 +135,9 @@ def check_usage(args: argparse.Namespace) -> None:
         name = (ruled_out or ["downscale"])[0].replace("_", "-")
         raise InputError(f"--{name} cannot be used with --protocol, which has rules of its own; leave it out")
     if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
-        raise InputError(f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out")
+        raise InputError(
+            f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out"
+        )
     if args.truth is not None and not args.protocol:
         raise InputError("--truth needs --protocol; leave it out")
     if args.data and len(args.data) not in (1, len(args.targets)):

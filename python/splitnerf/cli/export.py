@@ -14,7 +14,8 @@ MIN_FACES = 100
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "export", help="write a run's textured mesh and light",
+        "export",
+        help="write a run's textured mesh and light",
         description="Writes what RUN trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
@@ -23,9 +24,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf export runs/data --formats glb,obj --out asset",
             "splitnerf export runs/data --faces 20000 --texture-size 1024 --out small",
         ),
-    )  # fmt: skip
+    )
     parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained if it was refined)")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained if it was refined)"
+    )
     for option, kind, default, name, text in (
         ("--faces", int, None, "N", "faces of the textured mesh, 0 keeps all (default: as in training)"),
         ("--texture-size", int, None, "N", "texels along an edge (default: as in training)"),
@@ -38,9 +41,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import FIELDS
-    from splitnerf.run_folder import export_folder
     from splitnerf.export.scene import FORMATS
     from splitnerf.pipeline import export_run
+    from splitnerf.run_folder import export_folder
 
     formats = [name.strip() for name in args.formats.split(",")]
     unknown = [name for name in formats if name not in FORMATS]
@@ -56,8 +59,8 @@ def run(args: argparse.Namespace) -> int:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     exported = export_run(
-        args.run, out, formats=formats, n_faces=args.faces, texture_size=args.texture_size, resolution=args.resolution,
-    )  # fmt: skip
+        args.run, out, formats=formats, n_faces=args.faces, texture_size=args.texture_size, resolution=args.resolution
+    )
     closed = "watertight" if exported.watertight else "not watertight"
     dropped = f"{exported.n_dropped} floating or enclosed component{'' if exported.n_dropped == 1 else 's'} dropped"
     print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {dropped}")

@@ -10,9 +10,8 @@ from splitnerf.cli.help import examples
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "info", help="show the settings of a preset",
-        epilog=examples("splitnerf info --settings fast"),
-    )  # fmt: skip
+        "info", help="show the settings of a preset", epilog=examples("splitnerf info --settings fast")
+    )
     parser.add_argument(
         "--settings",
         metavar="PRESET",

@@ -14,19 +14,23 @@ if TYPE_CHECKING:
 def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data state or suggest") -> None:
     """Adds --eval-mode, --mask-kind and --max-memory; `default` is the help text of the first two's default."""
     parser.add_argument(
-        "--eval-mode", choices=["all", "fraction", "filename"],
+        "--eval-mode",
+        choices=["all", "fraction", "filename"],
         help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "
         f"their path, those with `train` train; all, no view is held out and all are evaluated (default: {default})",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--mask-kind", choices=["object", "ignore"],
+        "--mask-kind",
+        choices=["object", "ignore"],
         help="what mask files mean: object, white is the object; ignore, black is to be ignored and alpha is the "
         f"object (default: {default})",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--max-memory", type=float, metavar="GB",
+        "--max-memory",
+        type=float,
+        metavar="GB",
         help="memory for photos; more are read from a file in TMPDIR (default: half of what is available)",
-    )  # fmt: skip
+    )
 
 
 def reading_options(args: argparse.Namespace) -> dict[str, object]:

@@ -13,14 +13,15 @@ from splitnerf.errors import InputError
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "refine", help="fit an exported asset and its light to the photos: the refinement of train, alone",
+        "refine",
+        help="fit an exported asset and its light to the photos: the refinement of train, alone",
         description="Starts from RUN/trained, where the refinement kept what training exported, else from RUN. Moves the "
         "vertices of mesh.glb until its outline is that of the masks, then fits its textures (albedo, roughness, metallic, "
         "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
         "included. Writes mesh.glb, environment.exr and .hdr, and refinement.json into RUN/refined. Ctrl-C "
         "keeps the state there; --resume continues.",
         epilog=examples("splitnerf refine runs/data --data data --minutes 10"),
-    )  # fmt: skip
+    )
     parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
     parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
     parser.add_argument(
@@ -28,7 +29,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add_reading_options(parser, "as in training")
     parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
-    parser.add_argument("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
+    parser.add_argument(
+        "--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)"
+    )
     parser.add_argument("--resume", action="store_true", help="continue from the state that an interruption left")
     parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
@@ -50,9 +53,14 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{out}: is a file; give --out a folder")
     settings = RefinementSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
     refined = refine_run(
-        args.run, args.data, out, downscale=args.downscale, settings=settings, resume=args.resume,
+        args.run,
+        args.data,
+        out,
+        downscale=args.downscale,
+        settings=settings,
+        resume=args.resume,
         reading=reading_of(args, args.run),
-    )  # fmt: skip
+    )
     if refined is None:
         print(f"stopped; the state is in {out}. To continue, repeat the command with --resume.")
         return INTERRUPTED

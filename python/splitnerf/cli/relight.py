@@ -13,19 +13,25 @@ from splitnerf.errors import InputError
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "relight", help="render an asset under other lights",
+        "relight",
+        help="render an asset under other lights",
         description="Path-traces RUN's mesh.glb, or any metallic-roughness glTF file, under environment maps and "
         "writes NNN.png (sRGB, straight alpha) and NNN.exr (linear, associated alpha) for each frame.",
         epilog=examples(
             "splitnerf relight runs/data --env studio.hdr --out lit",
             "splitnerf relight chair.glb --env studio.hdr --turntable 48 --rotate light --gif --out turn",
         ),
-    )  # fmt: skip
-    # fmt: off
+    )
     add = parser.add_argument
     add("source", type=Path, metavar="RUN|FILE.glb", help="a run's folder, a .glb or a .gltf")
-    add("--env", type=Path, action="append", required=True, metavar="MAP",
-        help="equirectangular .exr or .hdr; repeated, each map has a sub-folder")
+    add(
+        "--env",
+        type=Path,
+        action="append",
+        required=True,
+        metavar="MAP",
+        help="equirectangular .exr or .hdr; repeated, each map has a sub-folder",
+    )
     add("--rotate-env", type=float, default=0.0, metavar="DEG", help="turn the light, counter-clockwise from above")
     cameras = parser.add_mutually_exclusive_group()
     cameras.add_argument("--turntable", type=int, metavar="N", help="a full turn in N frames (default: 1, the front)")
@@ -39,8 +45,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--size", metavar="W[xH]", help="pixels (default: the data's or the path's, else 512)")
     add("--spp", type=int, default=128, metavar="N", help="paths a pixel (default: 128)")
     add("--bounces", type=int, default=4, metavar="N", help="scattering events after the first (default: 4)")
-    add("--background", default="transparent", metavar="WHAT",
-        help="transparent (default), white, environment, or an image")
+    add(
+        "--background",
+        default="transparent",
+        metavar="WHAT",
+        help="transparent (default), white, environment, or an image",
+    )
     add("--shadow-catcher", action="store_true", help="show the shadow on the ground below the object")
     add("--exposure", type=float, default=0.0, metavar="EV", help="stops brighter (default: 0)")
     add("--gif", action="store_true", help="write animation.gif too")
@@ -48,7 +58,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--fps", type=float, default=12.0, help="of GIF and MP4 (default: 12)")
     add("--seed", type=int, default=0, help="of the first frame's random numbers (default: 0)")
     add("--overwrite", action="store_true", help="replace frames that stand in --out")
-    # fmt: on
     parser.set_defaults(execute=run)
 
 
@@ -69,9 +78,17 @@ def run(args: argparse.Namespace) -> int:
         return turntable(asset, count, elevation=args.elevation, rotate=args.rotate, size=size)
 
     settings = Settings(
-        spp=args.spp, bounces=args.bounces, seed=args.seed, rotate_env=args.rotate_env, exposure=args.exposure,
-        background=args.background, shadow_catcher=args.shadow_catcher, gif=args.gif, mp4=args.mp4, fps=args.fps,
-    )  # fmt: skip
+        spp=args.spp,
+        bounces=args.bounces,
+        seed=args.seed,
+        rotate_env=args.rotate_env,
+        exposure=args.exposure,
+        background=args.background,
+        shadow_catcher=args.shadow_catcher,
+        gif=args.gif,
+        mp4=args.mp4,
+        fps=args.fps,
+    )
     for folder in relight(args.source, args.env, views_of, args.out, settings, overwrite=args.overwrite):
         print(folder)
     return DONE
@@ -86,10 +103,13 @@ def check_ranges(args: argparse.Namespace) -> None:
     from splitnerf.render.path_traced import MOST_SPP
 
     limits = (
-        ("--spp", args.spp, 1, MOST_SPP), ("--bounces", args.bounces, 0, 64), ("--fps", args.fps, 0.1, 50),
-        ("--exposure", args.exposure, -20, 20), ("--rotate-env", args.rotate_env, -3600, 3600),
+        ("--spp", args.spp, 1, MOST_SPP),
+        ("--bounces", args.bounces, 0, 64),
+        ("--fps", args.fps, 0.1, 50),
+        ("--exposure", args.exposure, -20, 20),
+        ("--rotate-env", args.rotate_env, -3600, 3600),
         ("--seed", args.seed, 0, 1 << 31),
-    )  # fmt: skip
+    )
     for name, value, low, high in limits:
         if not low <= value <= high:
             raise InputError(f"{name} must lie between {low:g} and {high:g}, got {value:g}")

@@ -34,9 +34,12 @@ def print_scores(evaluation: dict) -> None:
             lpips = "" if scores["lpips"] is None else f", LPIPS {scores['lpips']:.4f}"
             print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}")
     for name, key, unit in (
-        ("normals, mean angle", "normal_mae_deg", "degrees"), ("roughness, mean error", "roughness_mae", ""),
-        ("metallic, bal. accuracy", "metallic_balanced_accuracy", ""), ("light PSNR", "light_psnr", "dB"),
-        ("mesh chamfer", "chamfer", ""), ("mesh F-score", "f_score", ""),
-    ):  # fmt: skip
+        ("normals, mean angle", "normal_mae_deg", "degrees"),
+        ("roughness, mean error", "roughness_mae", ""),
+        ("metallic, bal. accuracy", "metallic_balanced_accuracy", ""),
+        ("light PSNR", "light_psnr", "dB"),
+        ("mesh chamfer", "chamfer", ""),
+        ("mesh F-score", "f_score", ""),
+    ):
         if evaluation.get(key) is not None:
             print(f"{name:22s} {evaluation[key]:.4g} {unit}".rstrip())

@@ -22,18 +22,22 @@ if TYPE_CHECKING:
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "train", help="reconstruct an object from posed images",
+        "train",
+        help="reconstruct an object from posed images",
         description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
         "to the photos, and writes mesh.glb, mesh.ply, environment.exr/.hdr, evaluation.json and "
         "report.html into the run's folder.",
         epilog=examples(
-            "splitnerf train data --max-minutes 30", "splitnerf train data --preset fast --downscale 2 --out runs/fast",
+            "splitnerf train data --max-minutes 30",
+            "splitnerf train data --preset fast --downscale 2 --out runs/fast",
             "splitnerf train data --resume auto --view",
             after="A loss that is not finite stops the run, and so do ten gradients in a row that are not; one such gradient alone skips "
             "its step. The message names its origin; --resume continues from the last checkpoint.",
         ),
-    )  # fmt: skip
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for")
+    )
+    parser.add_argument(
+        "data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for"
+    )
     parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_alias(parser, "--output-dir", "--out")
     add_training_options(parser)
@@ -41,15 +45,20 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add_alias(parser, "--downscale-factor", "--downscale")
     add_reading_options(parser)
     parser.add_argument(
-        "--resume", nargs="?", const=True, choices=["auto"], metavar="auto",
+        "--resume",
+        nargs="?",
+        const=True,
+        choices=["auto"],
+        metavar="auto",
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
-    )  # fmt: skip
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
     parser.add_argument(
-        "--view", nargs="?", const=0, type=port, metavar="PORT",
-        help="show the run in a page while it trains",
-    )  # fmt: skip
-    parser.add_argument("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
+        "--view", nargs="?", const=0, type=port, metavar="PORT", help="show the run in a page while it trains"
+    )
+    parser.add_argument(
+        "--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too"
+    )
     parser.set_defaults(execute=run)
 
 
@@ -75,11 +84,15 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     add_alias(parser, "--max-num-iterations", "--steps")
     add_alias(parser, "--n_steps", "--steps")
-    parser.add_argument("--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it")
     parser.add_argument(
-        "--device", choices=["auto", "cpu", "cuda"], default="auto",
+        "--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it"
+    )
+    parser.add_argument(
+        "--device",
+        choices=["auto", "cpu", "cuda"],
+        default="auto",
         help="where to train; auto: on the GPU if it passes the operators' test, else on the CPU (default: auto)",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
     parser.add_argument(
         "--deterministic",
@@ -161,9 +174,15 @@ def train_in(
         return DONE
     device = choose_device(plan.device)
     trained, evaluation = reconstruct(
-        args.data, run, plan.config, downscale=args.downscale, device=device, resume=plan.resume, overwrite=plan.overwrite,
+        args.data,
+        run,
+        plan.config,
+        downscale=args.downscale,
+        device=device,
+        resume=plan.resume,
+        overwrite=plan.overwrite,
         observer=together(observers),
-    )  # fmt: skip
+    )
     if evaluation is None:
         where = "in the refinement" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To continue, repeat the command with --resume.")
@@ -193,8 +212,8 @@ def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) ->
     """The plan of a command. Raises InputError where its options do not fit the existing run."""
     from splitnerf.config import preset
     from splitnerf.devices import choose_device
-    from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.run_folder import begin_or_resume, is_finished
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
 
     resume, overwrite = begin_or_resume(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
     begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None

@@ -6,6 +6,13 @@ from splitnerf.config.settings import FIELDS, GROUPS, SHORT_NAMES, Config
 from splitnerf.config.table import settings_table
 
 __all__ = [
-    "FIELDS", "GROUPS", "MIN_EXPORT_SIZE", "PRESETS", "SHORT_NAMES", "Config", "parse_setting", "preset",
+    "FIELDS",
+    "GROUPS",
+    "MIN_EXPORT_SIZE",
+    "PRESETS",
+    "SHORT_NAMES",
+    "Config",
+    "parse_setting",
+    "preset",
     "settings_table",
-]  # fmt: skip
+]

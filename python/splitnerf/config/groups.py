@@ -26,7 +26,9 @@ class Run:
     steps: int = setting(6000, "optimiser steps of the whole run", unit="steps", at_least=1, at_most=10**9)
     max_minutes: float = setting(0.0, "time of training and refinement; 0: steps and sweeps end them", unit="minutes")
     deterministic: bool = setting(False, "the same bits in two runs on one machine with one number of threads")
-    cuda_graphs: bool = setting(False, "launches of a step on a GPU recorded and replayed; the number of rays then changes seldom")
+    cuda_graphs: bool = setting(
+        False, "launches of a step on a GPU recorded and replayed; the number of rays then changes seldom"
+    )
     preview_every: float = setting(0.1, "time between two previews", unit=OF_RUN)
     checkpoint_minutes: float = setting(2.0, "time between two checkpoints", unit="minutes")
 
@@ -51,9 +53,10 @@ class Exposure:
     """Relative exposure of the photos."""
 
     refine: str = setting(
-        "auto", "whether each photo's exposure is learned; auto: of JPEG files and photos that state exposures",
+        "auto",
+        "whether each photo's exposure is learned; auto: of JPEG files and photos that state exposures",
         choices=("auto", "yes", "no"),
-    )  # fmt: skip
+    )
     white_balance: bool = setting(False, "whether each channel has an exposure of its own")
 
 
@@ -77,17 +80,21 @@ class Surface:
         16, "binary logarithm of the entries of a level's hash table", at_least=1, at_most=24
     )
     table_dtype: str = setting(
-        "float32", "number format in which the hash table is read; it is trained in float32",
+        "float32",
+        "number format in which the hash table is read; it is trained in float32",
         choices=("float32", "float16", "bfloat16"),
-    )  # fmt: skip
+    )
     start: str = setting(
-        "stereo", "first shape: the photos' stereo depths within their visual hull (a sphere where few are clear), or a "
-        "sphere (the paper)", choices=("stereo", "sphere"),
-    )  # fmt: skip
+        "stereo",
+        "first shape: the photos' stereo depths within their visual hull (a sphere where few are clear), or a "
+        "sphere (the paper)",
+        choices=("stereo", "sphere"),
+    )
     normals: str = setting(
-        "analytic", "how the normals are derived from the distance; finite_difference: the paper",
+        "analytic",
+        "how the normals are derived from the distance; finite_difference: the paper",
         choices=("analytic", "finite_difference"),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -95,9 +102,11 @@ class Materials:
     """The network of albedo, roughness and metallic."""
 
     inputs: str = setting(
-        "grid", "inputs of the networks of material and occlusion; outputs: the surface's outputs (the paper); grid: "
-        "the hash features as well", choices=("outputs", "grid"),
-    )  # fmt: skip
+        "grid",
+        "inputs of the networks of material and occlusion; outputs: the surface's outputs (the paper); grid: "
+        "the hash features as well",
+        choices=("outputs", "grid"),
+    )
 
 
 @dataclass(frozen=True)
@@ -118,17 +127,18 @@ class Shading:
         "summed",
         "split: the split sum (the paper); summed: a sum over the directions of the bits, where lobes are wide",
         choices=("split", "summed"),
-    )  # fmt: skip
+    )
     fresnel: str = setting(
         "exact",
         "form of the Fresnel term; exact: the path tracer's and Blender's, Schlick's for metals and the exact one of "
         "index 1.5 for dielectrics; paper, code: as published, as released",
         choices=("exact", "paper", "code"),
-    )  # fmt: skip
+    )
     query: str = setting(
-        "mean", "query direction of the light: the lobe's mean, or the reflection (the paper)",
+        "mean",
+        "query direction of the light: the lobe's mean, or the reflection (the paper)",
         choices=("mean", "reflection"),
-    )  # fmt: skip
+    )
     compensate: bool = setting(True, "compensation of multiple scattering, as Blender has it")
     compositing: str = setting(
         "linear", "space in which samples are added; srgb: the paper", choices=("linear", "srgb")
@@ -140,9 +150,10 @@ class Occlusion:
     """Occlusion of the light by the object, and interreflection."""
 
     kind: str = setting(
-        "bits", "mlp: a network that learns traced factors (the paper); bits: visibility cached on the mesh; off: none",
+        "bits",
+        "mlp: a network that learns traced factors (the paper); bits: visibility cached on the mesh; off: none",
         choices=("mlp", "bits", "off"),
-    )  # fmt: skip
+    )
     channels: int = setting(3, "colours with factors of their own; 1: their mean (the paper)", choices=(1, 3))
     directional: bool = setting(
         True, "specular factor as a function of the reflection; false: of position alone (the paper)"
@@ -158,9 +169,7 @@ class Mesh:
     resolution: int = setting(
         96, "nodes of marching cubes along an edge", unit="nodes", at_least=MIN_EXPORT_SIZE, at_most=2048
     )
-    background: bool = setting(
-        False, "meshes made in a background thread, while training continues with the last one"
-    )
+    background: bool = setting(False, "meshes made in a background thread, while training continues with the last one")
 
 
 @dataclass(frozen=True)
@@ -171,16 +180,18 @@ class Sampling:
     target_samples: int = setting(4608, "samples of a step that the number of rays aims at", unit="samples", at_least=1)
     min_weight: float = setting(1e-3, "weight below which samples are left out; 0 takes all", at_least=0.0, below=1.0)
     occupancy: str = setting(
-        "distance", "how empty cells are found: distance bounds the density; average: a mean over time (the paper)",
+        "distance",
+        "how empty cells are found: distance bounds the density; average: a mean over time (the paper)",
         choices=("distance", "average"),
-    )  # fmt: skip
+    )
     grid_resolution: int = setting(
         96, "cells of the occupancy grid along an edge", unit="cells", at_least=1, at_most=512
     )
     pixel_cells: float = setting(
-        0.6, "width up to which pixels of large photos are averaged, in cells of the finest level; 0: no averages",
+        0.6,
+        "width up to which pixels of large photos are averaged, in cells of the finest level; 0: no averages",
         at_most=1024,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -196,9 +207,13 @@ class Losses:
     dark_metal_weight: float = setting(0.002, "weight of metals darker than real ones")
     mask_weight: float = setting(1.0, "weight of the masks")
     edge_pixels: int = setting(
-        2, "width of the band at mask edges where colours are compared including the background; 0 turns it off. Only for "
-        "separate mask files", unit="pixels", at_least=0, at_most=8,
-    )  # fmt: skip
+        2,
+        "width of the band at mask edges where colours are compared including the background; 0 turns it off. Only for "
+        "separate mask files",
+        unit="pixels",
+        at_least=0,
+        at_most=8,
+    )
     neutral_weight: float = setting(0.03, "weight of the diffuse light's log chroma")
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from half of the run")
@@ -211,7 +226,9 @@ class Refinement:
     """Refinement: the exported asset and its light are fitted to the photos."""
 
     enabled: bool = setting(True, "whether there is a refinement")
-    share: float = setting(0.2, "share of run.max_minutes for the refinement; training gets the rest", unit=OF_RUN, below=1.0)
+    share: float = setting(
+        0.2, "share of run.max_minutes for the refinement; training gets the rest", unit=OF_RUN, below=1.0
+    )
     sweeps: int = setting(16, "Gauss-Newton steps of the refinement where no minutes end it", unit="steps", at_least=1)
 
 

@@ -54,10 +54,18 @@ class Limits:
 
 
 def setting(
-    default: Any, meaning: str, *, unit: str = "", choices: Iterable = (), at_least: float | None = None,
-    above: float | None = None, at_most: float | None = None, below: float | None = None, multiple_of: int = 0,
+    default: Any,
+    meaning: str,
+    *,
+    unit: str = "",
+    choices: Iterable = (),
+    at_least: float | None = None,
+    above: float | None = None,
+    at_most: float | None = None,
+    below: float | None = None,
+    multiple_of: int = 0,
     power_of_2: bool = False,
-) -> Any:  # fmt: skip
+) -> Any:
     """The field of a group of settings, with its description as metadata: ``meaning``, ``unit``, ``limits``.
 
     Args:

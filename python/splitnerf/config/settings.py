@@ -142,9 +142,14 @@ has it, or the group is `run`: `n_levels` for `surface.n_levels`."""
 # Settings that exclude each other: the condition and the message.
 RULES = (
     (
-        lambda c: c.shading.method == "summed" and not (
-            c.occlusion.kind == "bits" and c.shading.compositing == "linear" and c.shading.fresnel == "exact"
-            and c.constants.occlusion_directions >= SUMMED_DIRECTIONS
+        lambda c: (
+            c.shading.method == "summed"
+            and not (
+                c.occlusion.kind == "bits"
+                and c.shading.compositing == "linear"
+                and c.shading.fresnel == "exact"
+                and c.constants.occlusion_directions >= SUMMED_DIRECTIONS
+            )
         ),
         f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} constants.occlusion_directions, "
         "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
@@ -162,14 +167,19 @@ RULES = (
         "a deterministic run ends by its steps alone; leave out --max-minutes (run.max_minutes) and give --steps",
     ),
     (
-        lambda c: c.run.cuda_graphs and (
-            c.occlusion.kind == "mlp" or c.light.kind == "mlp" or c.surface.normals != "analytic"
-            or c.constants.entropy_points == 1
+        lambda c: (
+            c.run.cuda_graphs
+            and (
+                c.occlusion.kind == "mlp"
+                or c.light.kind == "mlp"
+                or c.surface.normals != "analytic"
+                or c.constants.entropy_points == 1
+            )
         ),
         "run.cuda_graphs needs light.kind = pyramid, occlusion.kind = bits or off, surface.normals = analytic and "
         "more than one of constants.entropy_points; set run.cuda_graphs=false",
     ),
-)  # fmt: skip
+)
 
 
 def _flat(settings: dict[str, object]) -> Iterator[tuple[str, object]]:

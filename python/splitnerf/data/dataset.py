@@ -28,7 +28,9 @@ from splitnerf.progress import tracked
 SURROUNDINGS = "surroundings.exr"
 JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
-MEAN_EDGE = 1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
+MEAN_EDGE = (
+    1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
+)
 Average = Callable[[np.ndarray, int, "np.ndarray | None"], np.ndarray]  # see `Dataset.averaged`
 NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
 
@@ -88,7 +90,9 @@ class Dataset:
         self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
         if self.sizes is None:
             self.sizes = np.tile(self.images.shape[1:3], (len(self.images), 1))
-        self.exposures, self.stated = (np.ones(len(self.images)) if x is None else x for x in (self.exposures, self.stated))
+        self.exposures, self.stated = (
+            np.ones(len(self.images)) if x is None else x for x in (self.exposures, self.stated)
+        )
 
     def __len__(self) -> int:
         return len(self.images)
@@ -199,7 +203,12 @@ class Dataset:
 
 
 def load_dataset(
-    root: str | os.PathLike, split: str = "train", downscale: int = 1, reading: Reading = Reading(), *, masked: bool = True
+    root: str | os.PathLike,
+    split: str = "train",
+    downscale: int = 1,
+    reading: Reading = Reading(),
+    *,
+    masked: bool = True,
 ) -> Dataset:
     """Loads one split of a posed image set.
 

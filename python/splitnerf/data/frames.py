@@ -85,8 +85,11 @@ def split_rule(root: Path, reading: Reading = Reading()) -> str:
     if reading.eval_mode == "auto":
         by_data = layout_of(root).splits(root) is not None
         return "as the data say" if by_data else f"every {TEST_STRIDE}th; --eval-mode all trains on all"
-    rules = {"all": "all are trained on and evaluated", "fraction": f"every {TEST_STRIDE}th",
-             "filename": "by the words train and test in their paths"}  # fmt: skip
+    rules = {
+        "all": "all are trained on and evaluated",
+        "fraction": f"every {TEST_STRIDE}th",
+        "filename": "by the words train and test in their paths",
+    }
     return rules[reading.eval_mode]
 
 

@@ -94,7 +94,9 @@ def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
         intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
         converted = ImageCms.profileToProfile(image, source, target, intent, outputMode="RGB")
     except (ImageCms.PyCMSError, OSError, ValueError) as error:
-        note_once(f"{path.parent}: the colour profile of photos is not used, as {error}; convert them to sRGB", path.name)
+        note_once(
+            f"{path.parent}: the colour profile of photos is not used, as {error}; convert them to sRGB", path.name
+        )
         return colours
     note_once(f"{path.parent}: photos have the colour profile {name}; they are converted to sRGB", path.name)
     return np.asarray(converted)

@@ -15,9 +15,15 @@ SMALLEST, LARGEST = 1e-6, 1e9  # bounds of a pinhole's numbers
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4"), ("p1", "p2")
 LARGEST_COEFFICIENT = 1e3
 MODELS = {
-    "SIMPLE_PINHOLE": False, "PINHOLE": False, "SIMPLE_RADIAL": False, "RADIAL": False, "OPENCV": False,
-    "OPENCV_FISHEYE": True, "SIMPLE_RADIAL_FISHEYE": True, "RADIAL_FISHEYE": True,
-}  # fmt: skip
+    "SIMPLE_PINHOLE": False,
+    "PINHOLE": False,
+    "SIMPLE_RADIAL": False,
+    "RADIAL": False,
+    "OPENCV": False,
+    "OPENCV_FISHEYE": True,
+    "SIMPLE_RADIAL_FISHEYE": True,
+    "RADIAL_FISHEYE": True,
+}
 """The camera models that are read, by their usual names: whether the lens is a fisheye."""
 STRIP = 1 << 20  # pixels whose places in a photo are computed at once
 

@@ -51,7 +51,11 @@ class Loader:
         self.sizes = sizes // downscale
         shape = (len(frames), *self.sizes.max(axis=0).tolist())
         kind, bent = np.dtype(np.uint8 if exact else np.uint16), any(frame.distortion is not None for frame in frames)
-        hides = bent or bool((self.sizes != shape[1:]).any()) or any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
+        hides = (
+            bent
+            or bool((self.sizes != shape[1:]).any())
+            or any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
+        )
         floats = bent or any(f.gamma != 0 or f.image_path.suffix.lower() in HDR_SUFFIXES for f in frames)
         work = height * width * (WORK_BENT if floats else WORK)
         size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
@@ -97,7 +101,9 @@ class Loader:
         return Photos(self.codes, self.exposures)
 
     def _load(self, i: int, mask_kind: str) -> Photo:
-        found = None if self.separated is None else self.separated / separated_mask(self.frames[i].image_path, self.root)
+        found = (
+            None if self.separated is None else self.separated / separated_mask(self.frames[i].image_path, self.root)
+        )
         photo = load_photo(self.frames[i], self.downscale, mask_kind, found)
         height, width = self.sizes[i]
         if self.codes is not None:

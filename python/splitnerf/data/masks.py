@@ -43,7 +43,9 @@ def read_mask(path: Path) -> np.ndarray:
     if len(values) == 2:
         return np.where(mask == values[1], most, 0).astype(mask.dtype)
     if len(values) > 2 and values[-1] < MOST_LABELS:
-        raise InputError(f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black")
+        raise InputError(
+            f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black"
+        )
     return mask if values[0] == 0 or len(values) > 2 else np.full_like(mask, most)
 
 

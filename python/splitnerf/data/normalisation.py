@@ -28,9 +28,11 @@ class MasksContradict(ValueError):
 
 
 def estimate_box(
-    silhouettes: Sequence[np.ndarray], poses: np.ndarray, intrinsics: np.ndarray,
+    silhouettes: Sequence[np.ndarray],
+    poses: np.ndarray,
+    intrinsics: np.ndarray,
     known: Sequence[np.ndarray | None] | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Estimates the similarity from the data's world to the frame where the object fits the box [-1.5, 1.5]^3.
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
@@ -104,7 +106,9 @@ def _check_places(poses: np.ndarray) -> None:
     places = poses[:, :3, 3]
     if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
         many = f"all {len(poses)} cameras stand at one place, as if nothing had estimated the poses; estimate them"
-        raise ValueError(many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides")
+        raise ValueError(
+            many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides"
+        )
 
 
 def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -168,9 +172,7 @@ class MaskView:
     known: np.ndarray | None
 
     @classmethod
-    def of(
-        cls, silhouette: np.ndarray, pose: np.ndarray, intrinsics: np.ndarray, known: np.ndarray | None
-    ) -> MaskView:
+    def of(cls, silhouette: np.ndarray, pose: np.ndarray, intrinsics: np.ndarray, known: np.ndarray | None) -> MaskView:
         """The view of a mask [H, W] bool; the other arguments are those of `estimate_box` for one view."""
         height, width = silhouette.shape
         table = np.zeros((height + 1, width + 1), dtype=np.int32)

@@ -13,18 +13,27 @@ from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import NEGATIVE_SHARE
 from splitnerf.data.images import (
-    HDR_SUFFIXES, LDR_SUFFIXES, area_average, linear_to_srgb, read_colours, read_header, read_image,
-)  # fmt: skip
+    HDR_SUFFIXES,
+    LDR_SUFFIXES,
+    area_average,
+    linear_to_srgb,
+    read_colours,
+    read_header,
+    read_image,
+)
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.masks import read_mask
 from splitnerf.data.lens import check_shape, lens_intrinsics, undistort
+from splitnerf.data.masks import read_mask
 from splitnerf.data.pixels import averaged_codes, decoded, encoded
 from splitnerf.errors import InputError
 
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
-PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
+PEAK, BRIGHT = (
+    0.9,
+    0.999,
+)  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
 
@@ -89,7 +98,9 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
     kind = np.uint8 if colour.dtype == alpha.dtype == np.uint8 else np.uint16
     rgba = np.concatenate([encoded(colour, kind), encoded(alpha, kind)], axis=-1)
-    whole = is_object and frame.mask_path is not None and channels in (1, 3)  # where a photo has alpha, nothing lies behind
+    whole = (
+        is_object and frame.mask_path is not None and channels in (1, 3)
+    )  # where a photo has alpha, nothing lies behind
     says_nothing = bool((rgba[..., 3] == np.iinfo(kind).max).all())
     if frame.distortion is not None:
         straight, known = _undistort(decoded(rgba), known, frame, straight=whole)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import HDR_SUFFIXES
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.data.truth import read_map
 from splitnerf.errors import InputError

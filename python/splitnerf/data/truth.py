@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from splitnerf.data.layouts import view_folders
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.images import area_average, read_image, srgb_to_linear
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.errors import InputError
 
@@ -69,7 +69,9 @@ def load_scene_truth(root: str | os.PathLike, origin: np.ndarray | None = None) 
         InputError: One exists but cannot be used.
     """
     light, mesh = Path(root) / "light.hdr", Path(root) / "mesh.ply"
-    truth = SceneTruth(read_environment(light) if light.is_file() else None, read_mesh(mesh) if mesh.is_file() else None)
+    truth = SceneTruth(
+        read_environment(light) if light.is_file() else None, read_mesh(mesh) if mesh.is_file() else None
+    )
     if truth.mesh is not None and origin is not None and origin.any():
         truth.mesh.apply_translation(-origin)
     return truth

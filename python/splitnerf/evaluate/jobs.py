@@ -18,8 +18,8 @@ from splitnerf.data.reading import Reading
 from splitnerf.data.relit import PROTOCOLS, relight_maps
 from splitnerf.data.truth import ViewTruth, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
-from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.evaluate.asset import asset_predictions, environment_beside
+from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
@@ -127,9 +127,14 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
 
 
 def score_asset(
-    asset: Asset, environment: np.ndarray | None, views: Dataset, maps: dict[str, Path], spp: int, seconds: float | None = None,
+    asset: Asset,
+    environment: np.ndarray | None,
+    views: Dataset,
+    maps: dict[str, Path],
+    spp: int,
+    seconds: float | None = None,
     free_exposure: bool = False,
-) -> Evaluated:  # fmt: skip
+) -> Evaluated:
     """Scores an asset by path tracing.
 
     Args:
@@ -149,9 +154,16 @@ def score_asset(
 
 
 def score_fields(
-    model: SceneModel, grid: OccupancyGrid, views: Dataset, mesh: trimesh.Trimesh | None, asset: Asset | None,
-    maps: dict[str, Path], spp: int, seconds: float, free_exposure: bool = False,
-) -> Evaluated:  # fmt: skip
+    model: SceneModel,
+    grid: OccupancyGrid,
+    views: Dataset,
+    mesh: trimesh.Trimesh | None,
+    asset: Asset | None,
+    maps: dict[str, Path],
+    spp: int,
+    seconds: float,
+    free_exposure: bool = False,
+) -> Evaluated:
     """Scores trained fields by rendering them.
 
     Args:
@@ -170,15 +182,29 @@ def score_fields(
 
 
 def _scored(
-    predictions: list[dict[str, np.ndarray]], views: Dataset, light: np.ndarray | None, mesh: trimesh.Trimesh | None,
-    relit: tuple[RelitViews | None, dict | None], seconds: float | None, free_exposure: bool,
-) -> Evaluated:  # fmt: skip
+    predictions: list[dict[str, np.ndarray]],
+    views: Dataset,
+    light: np.ndarray | None,
+    mesh: trimesh.Trimesh | None,
+    relit: tuple[RelitViews | None, dict | None],
+    seconds: float | None,
+    free_exposure: bool,
+) -> Evaluated:
     """Scores rendered views, a light and a mesh against the truth of the data."""
     if free_exposure and light is not None:
         views = exposed_like(views, predictions)
     truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     scores = evaluate_maps(
-        predictions, views, truths, light, truth.light, mesh, truth.mesh, seconds, relight=relit[1], distance=load_distance()
+        predictions,
+        views,
+        truths,
+        light,
+        truth.light,
+        mesh,
+        truth.mesh,
+        seconds,
+        relight=relit[1],
+        distance=load_distance(),
     )
     return Evaluated(scores | ({"exposures": "fitted"} if free_exposure else {}), views, predictions, truths, relit[0])
 

@@ -37,7 +37,10 @@ def find_distance() -> tuple[Distance | None, str]:
         return None, f"the package {error.name} is not installed (pip install 'splitnerf[lpips]')"
     except Exception as error:  # torchvision's own, where it was built for another torch
         why = plain(str(error))[:80]
-        return None, f"the package lpips cannot be imported ({why}); install the torchvision of torch {torch.__version__}"
+        return (
+            None,
+            f"the package lpips cannot be imported ({why}); install the torchvision of torch {torch.__version__}",
+        )
     weights = Path(torch.hub.get_dir()) / "checkpoints" / BACKBONE_WEIGHTS
     if not weights.is_file():
         return None, f"{weights} is missing; it is {SOURCE}"

@@ -79,7 +79,9 @@ class Texels:
 def rasterise(uv: np.ndarray, faces: np.ndarray, size: int) -> Texels:
     """Finds the triangle under each texel's centre by tracing straight down onto the mesh laid flat."""
     parts = list(bands(uv, faces, size))
-    return Texels(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "triangle", "weights")))
+    return Texels(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "triangle", "weights"))
+    )
 
 
 def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
@@ -98,9 +100,14 @@ def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
 
 
 def bake(
-    mesh: UnwrappedMesh, surface: Surface, size: int, *, reach: float, offset: float,
+    mesh: UnwrappedMesh,
+    surface: Surface,
+    size: int,
+    *,
+    reach: float,
+    offset: float,
     on_surface: np.ndarray | None = None,
-) -> Textures:  # fmt: skip
+) -> Textures:
     """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
 
     The texels are evaluated in bands, so that the memory in addition to the maps does not grow with the texture.
@@ -175,9 +182,16 @@ def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
         )
     )
     open_share, _ = occlusion_factors(
-        MeshScene(mesh.vertices, mesh.faces), points, normals, normals, torch.ones(len(points), 1), torch.zeros(2, 4, 3),
-        n_diffuse_rays=OCCLUSION_RAYS, n_specular_rays=1, offset=offset,
-    )  # fmt: skip
+        MeshScene(mesh.vertices, mesh.faces),
+        points,
+        normals,
+        normals,
+        torch.ones(len(points), 1),
+        torch.zeros(2, 4, 3),
+        n_diffuse_rays=OCCLUSION_RAYS,
+        n_specular_rays=1,
+        offset=offset,
+    )
     values = Spread(texels.index, small)(open_share[:, 0].numpy())
     return np.clip(zoom(values, size / small, order=1, mode="nearest", grid_mode=True), 0, 1)
 

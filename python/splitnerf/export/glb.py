@@ -35,7 +35,11 @@ def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | Non
 
 
 def glb_content(
-    asset: Asset, occlusion: np.ndarray | None = None, path: str | os.PathLike = "the asset", *, filtering: int | None = None
+    asset: Asset,
+    occlusion: np.ndarray | None = None,
+    path: str | os.PathLike = "the asset",
+    *,
+    filtering: int | None = None,
 ) -> bytes:
     """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside.
 

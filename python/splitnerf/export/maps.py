@@ -50,8 +50,10 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
     if len(asset.triangles) == 0 or asset.triangles.min() < 0 or asset.triangles.max() >= n:
         raise RuntimeError(f"{path}: degenerate or empty mesh, nothing written")
     albedo, roughness_metallic, normal = (
-        material.albedo_texture, material.roughness_metallic_texture, material.normal_texture,
-    )  # fmt: skip
+        material.albedo_texture,
+        material.roughness_metallic_texture,
+        material.normal_texture,
+    )
     for texture in (albedo, roughness_metallic, normal, occlusion):
         if texture is not None and (asset.uv is None or not np.isfinite(texture).all()):
             raise RuntimeError(f"{path}: textures must be finite and the mesh have texture coordinates")

@@ -95,12 +95,21 @@ def write_assets(
             write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
         if set(formats) - {"ply"}:
             textured = textured_asset(
-                "object", vertices, faces, surface, n_faces=n_faces, texture_size=texture_size or c.export.texture_size,
-                spacing=spacing, occlusion_offset=c.constants.occlusion_offset, on_surface=on_surface,
+                "object",
+                vertices,
+                faces,
+                surface,
+                n_faces=n_faces,
+                texture_size=texture_size or c.export.texture_size,
+                spacing=spacing,
+                occlusion_offset=c.constants.occlusion_offset,
+                on_surface=on_surface,
                 tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
-            )  # fmt: skip
+            )
             bar.show(0.9, "export, files")
-            asset = dataclasses.replace(textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices))
+            asset = dataclasses.replace(
+                textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices)
+            )
             if "glb" in formats:
                 write_glb(out / "mesh.glb", asset, textured.occlusion)
             if "obj" in formats:

@@ -16,6 +16,17 @@ from splitnerf.fields.sdf import SdfField
 from splitnerf.fields.visibility import VisibilityBits
 
 __all__ = [
-    "EvaluatedLight", "Light", "LightMlp", "LightPyramid", "MaterialHead", "NoOcclusion", "Occlusion", "OcclusionHead",
-    "OcclusionModel", "OcclusionQuery", "RaySegments", "SdfField", "VisibilityBits",
-]  # fmt: skip
+    "EvaluatedLight",
+    "Light",
+    "LightMlp",
+    "LightPyramid",
+    "MaterialHead",
+    "NoOcclusion",
+    "Occlusion",
+    "OcclusionHead",
+    "OcclusionModel",
+    "OcclusionQuery",
+    "RaySegments",
+    "SdfField",
+    "VisibilityBits",
+]

@@ -31,8 +31,13 @@ class MaterialHead(nn.Module):
     """
 
     def __init__(
-        self, n_inputs: int, width: int = 256, n_layers: int = 2, initial_roughness: float = 0.5, min_roughness: float = 0.0
-    ):  # fmt: skip
+        self,
+        n_inputs: int,
+        width: int = 256,
+        n_layers: int = 2,
+        initial_roughness: float = 0.5,
+        min_roughness: float = 0.0,
+    ):
         super().__init__()
         self.net = relu_mlp(n_inputs, width, n_layers, 5)
         self.min_roughness = min_roughness

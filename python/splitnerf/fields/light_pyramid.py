@@ -86,12 +86,15 @@ def pyramid_filters(resolution: int) -> PyramidFilters:
         while side > SH_RESOLUTION:
             skipped, side = skipped + side * side, side // 2
         return PyramidFilters(
-            light_sum_of_levels(resolution), light_averages(resolution), light_filters(resolution, chain),
-            sh_projection(side, cells=side < resolution), slice(skipped, skipped + side * side),
+            light_sum_of_levels(resolution),
+            light_averages(resolution),
+            light_filters(resolution, chain),
+            sh_projection(side, cells=side < resolution),
+            slice(skipped, skipped + side * side),
             torch.tensor([resolution] + [m for m, _ in chain]),
             torch.tensor([BASE_NODE, *(rho for _, rho in chain), SH_NODE], dtype=torch.float64),
             zonal_factors(SH_NODE, ZONAL_ROWS),
-        )  # fmt: skip
+        )
 
 
 @functools.lru_cache(maxsize=4)
@@ -145,7 +148,9 @@ class LightPyramid(Light):
     def __init__(self, resolution: int = 64, start: float = 0.5):
         super().__init__()
         self.resolution = resolution
-        self.texels = nn.Parameter(torch.zeros(len(pyramid_filters(resolution).sum_of_levels.transposed_offsets) - 1, 3))
+        self.texels = nn.Parameter(
+            torch.zeros(len(pyramid_filters(resolution).sum_of_levels.transposed_offsets) - 1, 3)
+        )
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
 

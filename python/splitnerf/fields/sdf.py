@@ -53,9 +53,14 @@ class SdfField(nn.Module):
     """
 
     def __init__(
-        self, spec: HashGridSpec, box: float, width: int = 64, n_outputs: int = 13, radius: float = 0.5,
+        self,
+        spec: HashGridSpec,
+        box: float,
+        width: int = 64,
+        n_outputs: int = 13,
+        radius: float = 0.5,
         table_dtype: torch.dtype | None = None,
-    ):  # fmt: skip
+    ):
         super().__init__()
         self.box = box
         self.grid = HashGrid(spec, table_dtype=table_dtype)
@@ -119,10 +124,21 @@ class SdfField(nn.Module):
         """
         return SdfSample(
             *sdf_field(
-                positions, self.grid.table, self.hidden_direction, self.hidden_length, self.hidden_bias, self.out_direction,
-                self.out_length, self.out_bias, SOFTPLUS_BETA, self.box, self.grid.spec, self.grid.n_active, self.grid.stored(),
+                positions,
+                self.grid.table,
+                self.hidden_direction,
+                self.hidden_length,
+                self.hidden_bias,
+                self.out_direction,
+                self.out_length,
+                self.out_bias,
+                SOFTPLUS_BETA,
+                self.box,
+                self.grid.spec,
+                self.grid.n_active,
+                self.grid.stored(),
             )
-        )  # fmt: skip
+        )
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
         """The values of :meth:`sample`, with the gradient by central differences (six evaluations).

@@ -15,13 +15,13 @@ from torch.nn import functional as F
 from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, LightTexels, lobe_roughness
 from splitnerf.fields.occlusion import (
+    Emitters,
     Materials,
     Occlusion,
     OcclusionModel,
     OcclusionQuery,
     RaySegments,
     Reflect,
-    Emitters,
     TracedBits,
 )
 from splitnerf.ops import (
@@ -73,7 +73,9 @@ def emitters_of(cache: VisibilityCache) -> tuple[Tensor, Emitters]:
     view_dirs, normals = -cache.directions[directions], cache.normals[vertices]
     cosine = (normals * view_dirs).sum(1, keepdim=True)
     mirror = 2.0 * cosine * normals - view_dirs
-    nearest = torch.cat([(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK["cpu"])] or [directions])
+    nearest = torch.cat(
+        [(part @ cache.directions.T).argmax(1) for part in mirror.split(SHADED_CHUNK["cpu"])] or [directions]
+    )
     return rows, Emitters(vertices, directions, rows[vertices, nearest].long(), cosine > 0)
 
 
@@ -123,9 +125,14 @@ class VisibilityBits(OcclusionModel):
         mesh = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
         normals = torch.from_numpy(np.array(mesh.vertex_normals, dtype=np.float32))
         cache = VisibilityCache.trace(
-            scene, vertices.float(), normals, float(mesh.area), self.aims.cpu(), offset=self.offset,
+            scene,
+            vertices.float(),
+            normals,
+            float(mesh.area),
+            self.aims.cpu(),
+            offset=self.offset,
             with_hits=self.indirect,
-        )  # fmt: skip
+        )
         open_bits, blocked_bits = (bit_counts(cache.bits[:, side]) for side in (0, 1))
         blocked = blocked_bits / (open_bits + blocked_bits).clamp(min=1)
         is_unoccluded = len(blocked) > 0 and blocked.max().item() < self.open_below

@@ -40,7 +40,9 @@ lib = Operators()
 _FRAGMENT = torch.library.Library("splitnerf", "FRAGMENT")
 
 
-def register(name: str, *, fake: Callable, backward: Callable | None = None, setup_context: Callable | None = None) -> None:
+def register(
+    name: str, *, fake: Callable, backward: Callable | None = None, setup_context: Callable | None = None
+) -> None:
     """Registers the fake implementation and the gradient of ``splitnerf::name``, which takes and returns no list of tensors.
 
     An operator without ``backward`` raises in a backward pass; it never returns a gradient of zeros. Torch would lose a

@@ -128,10 +128,21 @@ class AdamW(torch.optim.Optimizer):
         copied = [i for i, param in enumerate(params) if param in self._copies]
         copies = [self._copies[params[i]].of(params[i]) for i in copied]
         lib.adamw_steps_(
-            params, [param.grad for param in params], means, squares, [float(group["lr"]) for group in groups], beta1, beta2, eps,
-            [group["weight_decay"] for group in groups], [int(count) + 1 for count in counts],
-            [group["sparse"] for group in groups], copies, copied, allowed,
-        )  # fmt: skip
+            params,
+            [param.grad for param in params],
+            means,
+            squares,
+            [float(group["lr"]) for group in groups],
+            beta1,
+            beta2,
+            eps,
+            [group["weight_decay"] for group in groups],
+            [int(count) + 1 for count in counts],
+            [group["sparse"] for group in groups],
+            copies,
+            copied,
+            allowed,
+        )
         torch.autograd.graph.increment_version([*params, *means, *squares, *copies])
         torch._foreach_add_(counts, 1)  # on the CPU
         self.counted += counts

@@ -238,10 +238,7 @@ register(
     "hash_encode_backward",
     fake=lambda positions, grad, *grid: grad.new_empty(_table_rows(grid), grad.shape[1] // grid[0]),
 )
-register(
-    "hash_encode_backward_positions",
-    fake=lambda positions, *rest: positions.new_empty(positions.shape),
-)
+register("hash_encode_backward_positions", fake=lambda positions, *rest: positions.new_empty(positions.shape))
 
 
 def growth_for(base_resolution: int, finest_resolution: int, n_levels: int) -> float:

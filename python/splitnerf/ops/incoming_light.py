@@ -49,10 +49,21 @@ class IncomingLight(NamedTuple):
 
 
 def incoming_light(
-    surface: TexturedSurface, environment: Tensor, positions: Tensor, geometric_normals: Tensor, normals: Tensor,
-    view_dirs: Tensor, albedo: Tensor, roughness: Tensor, metallic: Tensor, *, n_directions: int, max_bounces: int = 3,
-    clamp_indirect: float = 0.0, seed: int = 0,
-) -> IncomingLight:  # fmt: skip
+    surface: TexturedSurface,
+    environment: Tensor,
+    positions: Tensor,
+    geometric_normals: Tensor,
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    *,
+    n_directions: int,
+    max_bounces: int = 3,
+    clamp_indirect: float = 0.0,
+    seed: int = 0,
+) -> IncomingLight:
     """Draws directions for points of an asset, by the environment and by the material, and traces them. No gradient.
 
     Args:
@@ -77,10 +88,26 @@ def incoming_light(
     Source: Veach 1997 (multiple importance sampling); Heitz 2018 (visible normals).
     """
     directions, solid_angles, visible, sent = lib.incoming_light(
-        surface.scene.handle, positions, geometric_normals, normals, view_dirs, albedo, roughness, metallic,
-        surface.normals, surface.tangents, surface.uv, surface.albedo_map, surface.roughness_metallic_map,
-        surface.normal_map, environment, n_directions, max_bounces, clamp_indirect, seed,
-    )  # fmt: skip
+        surface.scene.handle,
+        positions,
+        geometric_normals,
+        normals,
+        view_dirs,
+        albedo,
+        roughness,
+        metallic,
+        surface.normals,
+        surface.tangents,
+        surface.uv,
+        surface.albedo_map,
+        surface.roughness_metallic_map,
+        surface.normal_map,
+        environment,
+        n_directions,
+        max_bounces,
+        clamp_indirect,
+        seed,
+    )
     pdf = torch.where(solid_angles > 0, 1.0 / (n_directions * solid_angles), 0.0)
     return IncomingLight(directions, pdf, visible, sent)
 

@@ -97,7 +97,4 @@ register(
     "prefilter_light_backward",
     fake=lambda query_dirs, roughness, total, grad_gbar, light_dirs: light_dirs.new_empty(light_dirs.shape),
 )
-register(
-    "sample_ggx_lobe",
-    fake=lambda axes, roughness, n_samples, seed: axes.new_empty(axes.shape[0], n_samples, 3),
-)
+register("sample_ggx_lobe", fake=lambda axes, roughness, n_samples, seed: axes.new_empty(axes.shape[0], n_samples, 3))

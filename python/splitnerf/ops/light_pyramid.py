@@ -49,10 +49,13 @@ def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> Sparse
     order = np.argsort(columns, kind="stable")
     transposed_offsets = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=n_columns))])
     return SparseMap(
-        torch.from_numpy(offsets.astype(np.int64)), torch.from_numpy(columns), torch.from_numpy(weights).to(dtype),
-        torch.from_numpy(transposed_offsets.astype(np.int64)), torch.from_numpy(rows[order]),
+        torch.from_numpy(offsets.astype(np.int64)),
+        torch.from_numpy(columns),
+        torch.from_numpy(weights).to(dtype),
+        torch.from_numpy(transposed_offsets.astype(np.int64)),
+        torch.from_numpy(rows[order]),
         torch.from_numpy(weights[order]).to(dtype),
-    )  # fmt: skip
+    )
 
 
 def light_sum_of_levels(resolution: int) -> SparseMap:

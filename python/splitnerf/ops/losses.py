@@ -12,9 +12,15 @@ from splitnerf.ops._library import lib, refuse_gradients, register
 
 
 def pixel_losses(
-    mean: Tensor, opacity: Tensor, target: Tensor, background: Tensor, whole: Tensor | None = None,
-    exposure: Tensor | None = None, *, linear: bool = True,
-) -> Tensor:  # fmt: skip
+    mean: Tensor,
+    opacity: Tensor,
+    target: Tensor,
+    background: Tensor,
+    whole: Tensor | None = None,
+    exposure: Tensor | None = None,
+    *,
+    linear: bool = True,
+) -> Tensor:
     """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
     masks.
 
@@ -123,10 +129,7 @@ def _entropy_backward(ctx, grad, _):
 
 
 register(
-    "pixel_losses",
-    fake=lambda mean, *rest: mean.new_empty(2),
-    setup_context=_keep_pixels,
-    backward=_pixel_backward,
+    "pixel_losses", fake=lambda mean, *rest: mean.new_empty(2), setup_context=_keep_pixels, backward=_pixel_backward
 )
 register(
     "pixel_losses_backward",

@@ -56,9 +56,15 @@ def monte_carlo_light(
 
 
 def summed_light(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, directions: Tensor, solid_angles: Tensor, radiance: Tensor,
-    visible: Tensor, sent: Tensor | None = None,
-) -> LightSums:  # fmt: skip
+    normals: Tensor,
+    view_dirs: Tensor,
+    roughness: Tensor,
+    directions: Tensor,
+    solid_angles: Tensor,
+    radiance: Tensor,
+    visible: Tensor,
+    sent: Tensor | None = None,
+) -> LightSums:
     """The integrals of :func:`monte_carlo_light` by quadrature over fixed directions that all points share.
 
     Args:
@@ -122,10 +128,20 @@ def shade_sums(
 
 
 def summed_correction(
-    normals: Tensor, view_dirs: Tensor, albedo: Tensor, roughness: Tensor, metallic: Tensor, split: Tensor, share: Tensor,
-    directions: Tensor, solid_angles: Tensor, radiance: Tensor, visible: Tensor, sent: Tensor | None = None,
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    split: Tensor,
+    share: Tensor,
+    directions: Tensor,
+    solid_angles: Tensor,
+    radiance: Tensor,
+    visible: Tensor,
+    sent: Tensor | None = None,
     compensate: bool = False,
-) -> Tensor:  # fmt: skip
+) -> Tensor:
     """What the sum over directions adds to another radiance of points to replace it by a share.
 
     ``(shade_sums(summed_light(...)) - split) share``
@@ -213,6 +229,7 @@ register(
 register(
     "shade_sums_backward",
     fake=lambda *inputs: (
-        *(t.new_empty(t.shape) for t in inputs[:6]), inputs[0].new_empty((0, 3) if inputs[8] is None else inputs[8].shape)
+        *(t.new_empty(t.shape) for t in inputs[:6]),
+        inputs[0].new_empty((0, 3) if inputs[8] is None else inputs[8].shape),
     ),
-)  # fmt: skip
+)

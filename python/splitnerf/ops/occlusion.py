@@ -116,17 +116,19 @@ def occlusion_factors(
     if n_channels not in (1, 3):
         raise ValueError(f"occlusion_factors: n_channels must be 1 or 3, got {n_channels}")
     o_d, o_s = lib.occlusion_factors(
-        scene.handle, *(x.cpu() for x in (positions, normals, lobe_dirs, roughness, environment)),
-        n_diffuse_rays, n_specular_rays, offset, along_ray, seed,
-    )  # fmt: skip
+        scene.handle,
+        *(x.cpu() for x in (positions, normals, lobe_dirs, roughness, environment)),
+        n_diffuse_rays,
+        n_specular_rays,
+        offset,
+        along_ray,
+        seed,
+    )
     o_d, o_s = o_d.to(positions.device), o_s.to(positions.device)
     return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
 
 
 register(
     "occlusion_factors",
-    fake=lambda scene, positions, *rest: (
-        positions.new_empty(positions.shape),
-        positions.new_empty(positions.shape),
-    ),
+    fake=lambda scene, positions, *rest: (positions.new_empty(positions.shape), positions.new_empty(positions.shape)),
 )

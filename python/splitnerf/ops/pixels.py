@@ -52,7 +52,14 @@ class EdgeRuns(NamedTuple):
 
 
 def draw_rays(
-    random: Tensor, n_near: int, near: PixelList, known: PixelList, matrices: Tensor, origins: Tensor, height: int, width: int
+    random: Tensor,
+    n_near: int,
+    near: PixelList,
+    known: PixelList,
+    matrices: Tensor,
+    origins: Tensor,
+    height: int,
+    width: int,
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Rays through the middles of random pixels: `n_near` of one list, the others of another.
 

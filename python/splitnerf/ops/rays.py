@@ -162,9 +162,14 @@ class ShadingSubset(NamedTuple):
 
 
 def spread_samples(
-    weights: Tensor, samples: PackedSamples, per_ray: int, phase: Tensor, gap: float = math.inf,
-    capacity: tuple[int, int] | None = None, unit: Tensor | None = None,
-) -> ShadingSubset:  # fmt: skip
+    weights: Tensor,
+    samples: PackedSamples,
+    per_ray: int,
+    phase: Tensor,
+    gap: float = math.inf,
+    capacity: tuple[int, int] | None = None,
+    unit: Tensor | None = None,
+) -> ShadingSubset:
     """Draws the samples of each ray that are shaded, in proportion to their weights.
 
     The weights of a ray are laid end to end, with `per_ray` evenly spaced marks on them; a sample is drawn when a mark
@@ -276,12 +281,7 @@ def _fake_surface(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmitt
 
 
 register("march_rays", fake=_fake_march)
-register(
-    "surface_weights",
-    fake=_fake_surface,
-    setup_context=_keep_surface,
-    backward=_surface_backward,
-)
+register("surface_weights", fake=_fake_surface, setup_context=_keep_surface, backward=_surface_backward)
 register(
     "surface_weights_backward",
     fake=lambda sdf, gradient, rays_d, *rest: (
@@ -310,7 +310,8 @@ register(
 register(
     "composite_backward",
     fake=lambda weights, values, offsets, opacity=None, *rest: (
-        weights.new_empty(weights.shape), values.new_empty(values.shape),
+        weights.new_empty(weights.shape),
+        values.new_empty(values.shape),
         weights.new_empty(0 if opacity is None else opacity.shape[0]),
     ),
-)  # fmt: skip
+)

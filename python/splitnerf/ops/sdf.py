@@ -48,9 +48,15 @@ class SdfNetwork(NamedTuple):
     def arguments(self) -> tuple:
         """The arguments that the operators take for a network."""
         return (
-            self.table, self.hidden, self.hidden_bias, self.out, self.out_bias, self.beta,
-            *self.spec.arguments(self.n_active), self.box,
-        )  # fmt: skip
+            self.table,
+            self.hidden,
+            self.hidden_bias,
+            self.out,
+            self.out_bias,
+            self.beta,
+            *self.spec.arguments(self.n_active),
+            self.box,
+        )
 
 
 def sdf_field(
@@ -171,9 +177,21 @@ def sample_rays(
         ValueError: A shape, dtype or number does not fit.
     """
     *samples, evaluated, found = lib.sample_rays(
-        rays_o, rays_d, jitter, cells, *network.arguments(), step, max_samples, s, anneal, min_weight, min_transmittance,
-        reach, lipschitz, room,
-    )  # fmt: skip
+        rays_o,
+        rays_d,
+        jitter,
+        cells,
+        *network.arguments(),
+        step,
+        max_samples,
+        s,
+        anneal,
+        min_weight,
+        min_transmittance,
+        reach,
+        lipschitz,
+        room,
+    )
     return PackedSamples(*samples), evaluated, found
 
 
@@ -181,9 +199,13 @@ def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
     n = rest[-1] or torch.library.get_ctx().new_dynamic_size()
     long, n_rays = torch.int64, rays_o.shape[0]
     return (
-        rays_o.new_empty(n, dtype=long), rays_o.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n_rays + 1, dtype=long),
-        rays_o.new_empty(n_rays, dtype=long), rays_o.new_empty((), dtype=long),
-    )  # fmt: skip
+        rays_o.new_empty(n, dtype=long),
+        rays_o.new_empty(n),
+        rays_o.new_empty(n),
+        rays_o.new_empty(n_rays + 1, dtype=long),
+        rays_o.new_empty(n_rays, dtype=long),
+        rays_o.new_empty((), dtype=long),
+    )
 
 
 def _keep_field(ctx, inputs, output):

@@ -36,9 +36,7 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
     return _brdf_lut(torch.device(device))
 
 
-def light_queries(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean"
-) -> tuple[Tensor, Tensor]:
+def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> tuple[Tensor, Tensor]:
     r"""Where shading looks the pre-integrated light up, for the specular and for the diffuse light at once.
 
     The specular lobe is looked up at
@@ -123,9 +121,21 @@ def split_sum_shade(
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
     return lib.split_sum_shade(
-        normals, view_dirs, albedo, roughness, metallic, specular, diffuse, occlusion_s, occlusion_d,
-        brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate, indirect_s, indirect_d,
-    )  # fmt: skip
+        normals,
+        view_dirs,
+        albedo,
+        roughness,
+        metallic,
+        specular,
+        diffuse,
+        occlusion_s,
+        occlusion_d,
+        brdf_lut(normals.device),
+        FRESNEL_MODES.index(fresnel_mode),
+        compensate,
+        indirect_s,
+        indirect_d,
+    )
 
 
 def _keep_query(ctx, inputs, output):
@@ -156,11 +166,12 @@ def _shade_backward(ctx, grad):
 register(
     "light_queries",
     fake=lambda normals, *rest: (
-        normals.new_empty(2 * normals.shape[0], 3), normals.new_empty(2 * normals.shape[0], 1)
+        normals.new_empty(2 * normals.shape[0], 3),
+        normals.new_empty(2 * normals.shape[0], 1),
     ),
     setup_context=_keep_query,
     backward=_queries_backward,
-)  # fmt: skip
+)
 register(
     "light_queries_backward",
     fake=lambda normals, view_dirs, roughness, *rest: tuple(t.new_empty(t.shape) for t in (normals, roughness)),
@@ -173,5 +184,7 @@ register(
 )
 register(
     "split_sum_shade_backward",
-    fake=lambda normals, *rest: tuple(normals.new_empty((0, 3) if t is None else t.shape) for t in (normals, *rest[:8])),
+    fake=lambda normals, *rest: tuple(
+        normals.new_empty((0, 3) if t is None else t.shape) for t in (normals, *rest[:8])
+    ),
 )

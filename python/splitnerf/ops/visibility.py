@@ -21,9 +21,14 @@ RADIUS_IN_SPACINGS = 1.5
 
 
 def visibility_bits(
-    scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float = 0.0125, *,
+    scene: MeshScene,
+    positions: Tensor,
+    normals: Tensor,
+    directions: Tensor,
+    offset: float = 0.0125,
+    *,
     with_hits: bool = False,
-) -> tuple[Tensor, Tensor]:  # fmt: skip
+) -> tuple[Tensor, Tensor]:
     """Traces the same directions from every vertex of a mesh and records whether each ray is blocked.
 
     Args:
@@ -69,9 +74,15 @@ class VisibilityCache:
 
     @staticmethod
     def trace(
-        scene: MeshScene, vertices: Tensor, normals: Tensor, area: float, directions: Tensor, *, offset: float = 0.0125,
+        scene: MeshScene,
+        vertices: Tensor,
+        normals: Tensor,
+        area: float,
+        directions: Tensor,
+        *,
+        offset: float = 0.0125,
         with_hits: bool = False,
-    ) -> VisibilityCache:  # fmt: skip
+    ) -> VisibilityCache:
         """Traces the cache of a mesh with the given surface area (scene units squared); see :func:`visibility_bits`."""
         bits, hits = visibility_bits(scene, vertices, normals, directions, offset, with_hits=with_hits)
         radius = RADIUS_IN_SPACINGS * (area / len(vertices)) ** 0.5
@@ -91,9 +102,14 @@ class VisibilityCache:
 
 
 def cached_occlusion(
-    cache: VisibilityCache, positions: Tensor, normals: Tensor, lobe_dirs: Tensor, roughness: Tensor, light: Tensor,
+    cache: VisibilityCache,
+    positions: Tensor,
+    normals: Tensor,
+    lobe_dirs: Tensor,
+    roughness: Tensor,
+    light: Tensor,
     radiance: Tensor | None = None,
-) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:  # fmt: skip
+) -> tuple[Tensor, Tensor, Tensor | None, Tensor | None]:
     r"""Occlusion factors of points, and the light that the mesh itself sends to them, from the cached bits.
 
     V_i is the open share of direction i among the vertices around the point, weighted by distance and by agreement of
@@ -132,9 +148,21 @@ def cached_occlusion(
     """
     hits = cache.hits if radiance is not None else cache.hits[:, :0]
     o_d, o_s, i_d, i_s = lib.cached_occlusion(
-        positions, normals, lobe_dirs, roughness, cache.vertices, cache.normals, cache.starts, cache.order,
-        cache.radius, cache.bits, hits, cache.vertices[:0] if radiance is None else radiance, cache.directions, light,
-    )  # fmt: skip
+        positions,
+        normals,
+        lobe_dirs,
+        roughness,
+        cache.vertices,
+        cache.normals,
+        cache.starts,
+        cache.order,
+        cache.radius,
+        cache.bits,
+        hits,
+        cache.vertices[:0] if radiance is None else radiance,
+        cache.directions,
+        light,
+    )
     return (o_d, o_s, None, None) if radiance is None else (o_d, o_s, i_d, i_s)
 
 
@@ -157,9 +185,18 @@ def cached_visibility(
     """
     hits = cache.hits if radiance is not None else cache.hits[:, :0]
     visible, arriving = lib.cached_visibility(
-        positions, normals, cache.vertices, cache.normals, cache.starts, cache.order, cache.radius, cache.bits, hits,
-        cache.vertices[:0] if radiance is None else radiance, cache.directions,
-    )  # fmt: skip
+        positions,
+        normals,
+        cache.vertices,
+        cache.normals,
+        cache.starts,
+        cache.order,
+        cache.radius,
+        cache.bits,
+        hits,
+        cache.vertices[:0] if radiance is None else radiance,
+        cache.directions,
+    )
     return visible, (None if radiance is None else arriving)
 
 

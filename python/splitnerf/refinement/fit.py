@@ -176,9 +176,13 @@ class Refinement:
         width = self.patch_width = patch_width(dataset, self.texels)
         smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         prior = Prior(
-            pairs=self.texels.pairs, smooth=smooth,
-            flat=per_unknown(*FLAT), groups=GROUPS, anchor=per_unknown(*[ANCHOR] * 3), like=like,
-        )  # fmt: skip
+            pairs=self.texels.pairs,
+            smooth=smooth,
+            flat=per_unknown(*FLAT),
+            groups=GROUPS,
+            anchor=per_unknown(*[ANCHOR] * 3),
+            like=like,
+        )
         self.equations = NormalEquations(self.unknowns, prior, KEEP)
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
@@ -193,10 +197,14 @@ class Refinement:
     def state(self) -> dict[str, object]:
         """The state that further sweeps depend on, without the arguments, as tensors and plain values."""
         return {
-            "unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient,
+            "unknowns": self.unknowns,
+            "curvature": self.equations.curvature,
+            "gradient": self.equations.gradient,
             "light": self.light.levels,
-            "random": self.random.bit_generator.state, "n_batches": self.n_batches, "n_sweeps": self.n_sweeps,
-        }  # fmt: skip
+            "random": self.random.bit_generator.state,
+            "n_batches": self.n_batches,
+            "n_sweeps": self.n_sweeps,
+        }
 
     def restore(self, state: dict[str, object]) -> None:
         """Restores what :meth:`state` returned for a fit with the same arguments.
@@ -244,10 +252,20 @@ class Refinement:
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
         arriving = incoming_light(
-            surface, light, samples.positions, samples.geometric, m.normals.detach(), samples.view_dirs,
-            m.albedo.detach(), m.roughness.detach(), m.metallic.detach(), n_directions=s.directions, max_bounces=BOUNCES,
-            clamp_indirect=CLAMP_INDIRECT, seed=s.seed + self.n_batches,
-        )  # fmt: skip
+            surface,
+            light,
+            samples.positions,
+            samples.geometric,
+            m.normals.detach(),
+            samples.view_dirs,
+            m.albedo.detach(),
+            m.roughness.detach(),
+            m.metallic.detach(),
+            n_directions=s.directions,
+            max_bounces=BOUNCES,
+            clamp_indirect=CLAMP_INDIRECT,
+            seed=s.seed + self.n_batches,
+        )
         texels, shares = footprints(self.light.height, arriving.directions.view(-1, 3))
         sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
@@ -264,7 +282,9 @@ class Refinement:
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
         shaded = self.shade(surface, samples, unknowns)
         colours = shaded.colours
-        target, brightest, saturated = (torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated))
+        target, brightest, saturated = (
+            torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated)
+        )
         pairs = colours.detach().view(-1, 2, 3)
         weights = srgb_slope(brightest.clamp(min=MIN_TONE)).square()
         weights = torch.where(saturated & (pairs.mean(1) > target), 0.0, weights)
@@ -272,7 +292,9 @@ class Refinement:
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
         if self.settings.light_step > 0:
-            slopes = torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
+            slopes = (
+                torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
+            )
             self.light_equations.add(Rows(shaded.texels, shaded.shares, slopes, weights_of_rays), shaded.sky, of_other)
         jacobian = torch.stack(
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
@@ -282,9 +304,7 @@ class Refinement:
         self.n_batches += 1
         return float(squared.mean())
 
-    def sweep(
-        self, seconds: float = math.inf, report: Callable[[], None] = lambda: None
-    ) -> tuple[float, list[float]]:
+    def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> tuple[float, list[float]]:
         """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step.
 
         Args:
@@ -300,7 +320,7 @@ class Refinement:
         errors: list[float] = []
         while len(errors) < n_batches and (
             len(errors) < LEAST_BATCHES or time.monotonic() - started + self.step_seconds < seconds
-        ):  # fmt: skip
+        ):
             errors.append(self.gather(surface))
             report()
         gathered, error = time.monotonic(), float(np.mean(errors))
@@ -309,13 +329,17 @@ class Refinement:
         if s.light_step > 0:
             moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
             if not np.isfinite(moved):
-                raise RuntimeError(f"refinement: the light after {self.n_batches} batches is not finite; nothing was written")
+                raise RuntimeError(
+                    f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
+                )
         limits = torch.tensor(STEP_LIMITS)
         like = usual_gloss(self.unknowns, self.equations.start, self.texels.positions, s.seed)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):
-            raise RuntimeError(f"refinement: the step after {self.n_batches} batches is not finite; nothing was written")
+            raise RuntimeError(
+                f"refinement: the step after {self.n_batches} batches is not finite; nothing was written"
+            )
         self.unknowns = wanted
         self.n_sweeps += 1
         self.equations.move(step)
@@ -355,9 +379,14 @@ class Stage:
     """
 
     def __init__(
-        self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings, state: dict | None = None,
+        self,
+        dataset: Dataset,
+        asset: Asset,
+        environment: np.ndarray,
+        settings: RefinementSettings,
+        state: dict | None = None,
         show: Callable[[float, str], None] = lambda share, message: None,
-    ):  # fmt: skip
+    ):
         check_form(asset)
         self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
         self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
@@ -421,15 +450,21 @@ class Stage:
 
     def message(self, step: int) -> str:
         """The message of a step, with the error of the photos before the last whole step."""
-        return f"refinement, step {step}" + (f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else "")
+        return f"refinement, step {step}" + (
+            f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else ""
+        )
 
     def state(self) -> dict[str, object]:
         """The state from which the refinement continues, as tensors and plain values."""
         vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
         return {
-            "vertices": vertices, "outline": self.outline, "sweeps": [list(sweep) for sweep in self.sweeps],
-            "lamp": None if self.lamp is None else list(self.lamp), "seconds": self.seconds, "fit": self.fit.state(),
-        }  # fmt: skip
+            "vertices": vertices,
+            "outline": self.outline,
+            "sweeps": [list(sweep) for sweep in self.sweeps],
+            "lamp": None if self.lamp is None else list(self.lamp),
+            "seconds": self.seconds,
+            "fit": self.fit.state(),
+        }
 
     def result(self) -> Refined:
         """The result so far."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
-from splitnerf.data.exposures import with_exposures
 from splitnerf.data.environment import read_environment
+from splitnerf.data.exposures import with_exposures
 from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average
@@ -54,7 +54,9 @@ def read_light(folder: Path) -> np.ndarray:
     light = read_environment(path)
     height = fitting_height(light.shape[0])
     if height == 0 or light.shape[1] != 2 * light.shape[0]:
-        raise InputError(f"{path}: is {light.shape[1]}x{light.shape[0]}; a light of 8 2^k rows, twice as wide, is needed")
+        raise InputError(
+            f"{path}: is {light.shape[1]}x{light.shape[0]}; a light of 8 2^k rows, twice as wide, is needed"
+        )
     return area_average(light, light.shape[0] // height).astype(np.float32)
 
 
@@ -131,7 +133,13 @@ def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> s
 
 
 def refine_folder(
-    source: Path, dataset: Dataset, out: Path, settings: RefinementSettings, *, resume: bool = False, save_minutes: float = 2.0
+    source: Path,
+    dataset: Dataset,
+    out: Path,
+    settings: RefinementSettings,
+    *,
+    resume: bool = False,
+    save_minutes: float = 2.0,
 ) -> Refined | None:
     """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the
     sweep. While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
@@ -195,9 +203,14 @@ def read_source(source: Path) -> tuple[Asset, np.ndarray]:
 
 
 def begin(
-    dataset: Dataset, asset: Asset, light: np.ndarray, settings: RefinementSettings, state: dict | None, path: Path,
+    dataset: Dataset,
+    asset: Asset,
+    light: np.ndarray,
+    settings: RefinementSettings,
+    state: dict | None,
+    path: Path,
     show: Callable[[float, str], None],
-) -> Stage:  # fmt: skip
+) -> Stage:
     """A new refinement, or one that continues from the state in the file `path`. Raises InputError where it cannot."""
     try:
         return Stage(dataset, asset, light, settings, state, show)
@@ -210,8 +223,13 @@ def begin(
 def record_of(refined: Refined, seconds: float) -> dict:
     """The contents of refinement.json."""
     lamp = None if refined.lamp is None else refined.lamp._asdict()
-    return {"seconds": round(seconds, 1), "outline": refined.outline, "lamp": lamp, "saturated": refined.saturated,
-            "sweeps": [sweep._asdict() for sweep in refined.sweeps]}  # fmt: skip
+    return {
+        "seconds": round(seconds, 1),
+        "outline": refined.outline,
+        "lamp": lamp,
+        "saturated": refined.saturated,
+        "sweeps": [sweep._asdict() for sweep in refined.sweeps],
+    }
 
 
 def refinement_summary(run: Path) -> dict:
@@ -219,11 +237,12 @@ def refinement_summary(run: Path) -> dict:
     record = read_json(run / RECORD, "sweeps")
     sweeps, outline = record["sweeps"], record["outline"]
     return {
-        "steps": len(sweeps), "seconds": record["seconds"],
+        "steps": len(sweeps),
+        "seconds": record["seconds"],
         "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "saturated": record["saturated"],
-    }  # fmt: skip
+    }
 
 
 def forget_state(folder: Path) -> None:
@@ -232,9 +251,15 @@ def forget_state(folder: Path) -> None:
 
 
 def refine_run(
-    run: Path, data: Path, out: Path, *, downscale: int, settings: RefinementSettings, resume: bool = False,
+    run: Path,
+    data: Path,
+    out: Path,
+    *,
+    downscale: int,
+    settings: RefinementSettings,
+    resume: bool = False,
     reading: Reading = Reading(),
-) -> Refined | None:  # fmt: skip
+) -> Refined | None:
     """Refines what training exported into a run; see :func:`refine_folder`."""
     source = source_of(run)
     refuse_data(out)

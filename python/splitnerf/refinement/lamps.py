@@ -110,7 +110,9 @@ def parts_of_light(light: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     sums = np.cumsum(power)
     chosen = np.searchsorted(sums, (np.arange(n) + 0.5) / n * sums[-1]).clip(max=len(power) - 1)
     colour = light.reshape(-1, 3)[chosen]
-    return directions.reshape(-1, 3)[chosen], colour / np.maximum(colour.mean(axis=1, keepdims=True), 1e-9) * sums[-1] / n
+    return directions.reshape(-1, 3)[chosen], colour / np.maximum(colour.mean(axis=1, keepdims=True), 1e-9) * sums[
+        -1
+    ] / n
 
 
 def disc(direction: np.ndarray, radius: float, n: int) -> np.ndarray:
@@ -144,7 +146,9 @@ class Points(NamedTuple):
     def cosines(self, directions: np.ndarray) -> np.ndarray:
         """[2 k, n] irradiance by lamps of power 1 at directions [n, 3], n a multiple of 32: the cosine, 0 where
         hidden."""
-        tensors = (torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions))
+        tensors = (
+            torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (self.origins, self.geometric, directions)
+        )
         bits = visibility_bits(self.scene, *tensors, offset=0.0)[0][:, 0].contiguous().numpy()
         seen = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")
         return seen * np.clip(self.normals @ directions.T, 0, None).astype(np.float32)
@@ -162,9 +166,12 @@ def pairs_of(texels: AssetTexels, apart: int, seed: int) -> Points:
     albedo, metallic = values[:, :3].numpy(), values[:, 4].numpy()
     offset = 2e-3 * float(np.ptp(asset.vertices, axis=0).max())
     points = Points(
-        MeshScene(asset.vertices, asset.triangles), samples.positions.numpy() + offset * geometric, normals, geometric,
+        MeshScene(asset.vertices, asset.triangles),
+        samples.positions.numpy() + offset * geometric,
+        normals,
+        geometric,
         np.log(np.maximum(albedo, 1e-3)).mean(axis=1),
-    )  # fmt: skip
+    )
     alike = (normals[0::2] * normals[1::2]).sum(axis=1) > MIN_ALIKE
     dielectric = metallic.reshape(-1, 2).max(axis=1) < MAX_METALLIC
     return points.chosen(alike & dielectric & (albedo.mean(axis=1).reshape(-1, 2).max(axis=1) > MIN_ALBEDO))
@@ -198,8 +205,11 @@ class Contrasts:
         self._table = points.cosines(self._directions)
         arriving = [
             points.cosines(directions) @ powers.mean(axis=1)
-            for directions, powers in (parts_of_light(light - lobe.radiance, N_BEHIND), parts_of_light(lobe.radiance, N_LOBE))
-        ]  # fmt: skip
+            for directions, powers in (
+                parts_of_light(light - lobe.radiance, N_BEHIND),
+                parts_of_light(lobe.radiance, N_LOBE),
+            )
+        ]
         self._behind, self._before = arriving[0], arriving[0] + arriving[1]
         self._least = max(DARK * float(self._before.mean()), 1e-20)
 
@@ -245,7 +255,9 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
     return min(trials, key=lambda trial: trial.cost)
 
 
-def compact_lamp(texels: AssetTexels, light: np.ndarray, patch: int, seed: int) -> tuple[np.ndarray, CompactLamp | None]:
+def compact_lamp(
+    texels: AssetTexels, light: np.ndarray, patch: int, seed: int
+) -> tuple[np.ndarray, CompactLamp | None]:
     """The light with its brightest lobe made compact, if the albedo indicates a compact lamp.
 
     Args:

@@ -108,7 +108,9 @@ class LightEquations:
         for number, level in enumerate(self._levels(vector)):
             mean, colour = parts_of(level, number)
             brightness = WEIGHT / (BRIGHTNESS**2 + mean.square() / TAILS)
-            parts.append([brightness, WEIGHT / ((COLOUR / 2**number) ** 2 + colour.square().mean(0, keepdim=True) / TAILS)])
+            parts.append(
+                [brightness, WEIGHT / ((COLOUR / 2**number) ** 2 + colour.square().mean(0, keepdim=True) / TAILS)]
+            )
         return tuple(torch.cat([part.expand(3, -1, -1).flatten() for part in kind]) for kind in zip(*parts))
 
     def _prior(self, vector: Tensor, precisions: tuple[Tensor, Tensor]) -> Tensor:

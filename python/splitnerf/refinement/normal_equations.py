@@ -123,8 +123,10 @@ class NormalEquations:
         down = self.gradient + anchor * (unknowns - self.start) + pull * unlike + self._differences(unknowns, flat)
         return conjugate_gradients(
             lambda x: torch.einsum("mnk,mk->mn", system, x) + self._differences(x, smooth),
-            lambda x: torch.einsum("mnk,mk->mn", inverses, x), -down, n_iterations,
-        )  # fmt: skip
+            lambda x: torch.einsum("mnk,mk->mn", inverses, x),
+            -down,
+            n_iterations,
+        )
 
     @torch.no_grad()
     def move(self, step: Tensor) -> None:

@@ -94,14 +94,21 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, 
             continue
         photo, (row, column) = dataset.images[i], np.divmod(numbers, dataset.width)
         colours, brightest = photo[row, column, :3], brightest_around(photo)[row, column]
-        parts.append((
-            np.full(len(numbers), i), np.stack([column, row], axis=1).astype(np.float32) + 0.5,
-            srgb_to_linear(colours), srgb_to_linear(brightest), colours >= SATURATED * white[i],
-        ))  # fmt: skip
+        parts.append(
+            (
+                np.full(len(numbers), i),
+                np.stack([column, row], axis=1).astype(np.float32) + 0.5,
+                srgb_to_linear(colours),
+                srgb_to_linear(brightest),
+                colours >= SATURATED * white[i],
+            )
+        )
     shapes = ((0,), (0, 2), (0, 3), (0, 3), (0, 3))
     kinds = (np.int64, np.float32, np.float32, np.float32, bool)
-    arrays = [np.concatenate([np.zeros(shape, kind), *(part[k] for part in parts)], dtype=kind)
-              for k, (shape, kind) in enumerate(zip(shapes, kinds))]  # fmt: skip
+    arrays = [
+        np.concatenate([np.zeros(shape, kind), *(part[k] for part in parts)], dtype=kind)
+        for k, (shape, kind) in enumerate(zip(shapes, kinds))
+    ]
     return Pixels(*arrays, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics)
 
 

@@ -106,9 +106,7 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
     return pose
 
 
-def data_views(
-    root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()
-) -> list[View]:
+def data_views(root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()) -> list[View]:
     """The cameras of a data set's split, in the data's world; each image's size is the default.
 
     Raises:

@@ -19,8 +19,16 @@ from splitnerf.files import locked
 from splitnerf.relight.background import Background, compose
 from splitnerf.relight.cameras import View, bounding_sphere
 from splitnerf.relight.output import (
-    GIF, MP4, check_folder, display_frame, file_names, require_ffmpeg, write_frame, write_gif, write_mp4,
-)  # fmt: skip
+    GIF,
+    MP4,
+    check_folder,
+    display_frame,
+    file_names,
+    require_ffmpeg,
+    write_frame,
+    write_gif,
+    write_mp4,
+)
 from splitnerf.render.path_traced import AssetRenderer
 
 
@@ -66,9 +74,14 @@ def asset_of(path: Path) -> Asset:
 
 
 def relight(
-    source: Path, maps: list[Path], views_of: Callable[[Asset], list[View]], out: Path, settings: Settings,
-    *, overwrite: bool = False,
-) -> list[Path]:  # fmt: skip
+    source: Path,
+    maps: list[Path],
+    views_of: Callable[[Asset], list[View]],
+    out: Path,
+    settings: Settings,
+    *,
+    overwrite: bool = False,
+) -> list[Path]:
     """Renders an asset under environment maps into NNN.png and NNN.exr and, if requested, GIF or MP4.
 
     Args:
@@ -116,9 +129,13 @@ def folder_name(path: Path) -> str:
 
 
 def render_frames(
-    asset: Asset, lights: list[np.ndarray], views: list[View], folders: list[Path], background: Background,
+    asset: Asset,
+    lights: list[np.ndarray],
+    views: list[View],
+    folders: list[Path],
+    background: Background,
     settings: Settings,
-) -> None:  # fmt: skip
+) -> None:
     """Renders all views under each light into its folder."""
     renderer = AssetRenderer(asset)
     ground = _lowest(asset) if settings.shadow_catcher else None
@@ -129,9 +146,16 @@ def render_frames(
             for index, view in enumerate(views):
                 turned = rotate_environment(light, view.light_degrees)
                 images = renderer.render(
-                    turned, view.pose, view.intrinsics, view.width, view.height, spp=settings.spp,
-                    bounces=settings.bounces, seed=settings.seed + index, catcher_height=ground,
-                )  # fmt: skip
+                    turned,
+                    view.pose,
+                    view.intrinsics,
+                    view.width,
+                    view.height,
+                    spp=settings.spp,
+                    bounces=settings.bounces,
+                    seed=settings.seed + index,
+                    catcher_height=ground,
+                )
                 linear = compose(images, background.behind(view, turned, exposure), exposure)
                 write_frame(folder, index, linear, with_alpha=background.transparent)
                 if settings.gif or settings.mp4:

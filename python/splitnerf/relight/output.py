@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from splitnerf.data.images import is_written_here, linear_to_srgb, to_uint8, write_image
 from splitnerf.data.frames import refuse_data
+from splitnerf.data.images import is_written_here, linear_to_srgb, to_uint8, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
 
@@ -118,9 +118,14 @@ def write_mp4(path: Path, frames: list[np.ndarray], fps: float) -> None:
     height, width = (side - side % 2 for side in frames[0].shape[:2])
     with atomic_path(path) as temporary:
         writer = imageio_ffmpeg.write_frames(
-            str(temporary), (width, height), fps=fps, codec="libx264", quality=8, macro_block_size=2,
+            str(temporary),
+            (width, height),
+            fps=fps,
+            codec="libx264",
+            quality=8,
+            macro_block_size=2,
             ffmpeg_log_level="error",
-        )  # fmt: skip
+        )
         writer.send(None)
         for frame in frames:
             writer.send(np.ascontiguousarray(frame[:height, :width]))

@@ -93,9 +93,12 @@ def make_light(config: Config) -> Light:
     if config.light.kind == "pyramid":
         return LightPyramid(config.light.resolution)
     return LightMlp(
-        config.constants.light_width, config.constants.light_layers, config.constants.direction_frequencies,
-        config.constants.roughness_frequencies, config.constants.light_activation,
-    )  # fmt: skip
+        config.constants.light_width,
+        config.constants.light_layers,
+        config.constants.direction_frequencies,
+        config.constants.roughness_frequencies,
+        config.constants.light_activation,
+    )
 
 
 def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
@@ -221,17 +224,41 @@ class SceneModel(nn.Module):
         surface = on_surface(positions, normals, outputs[:, 0])
         occlusion = self.occlusion(OcclusionQuery(inputs, surface, facing, lobe_dirs, roughness), segments)
         shaded = split_sum_shade(
-            normals, view_dirs, albedo, roughness, metallic, light(*asked), None, occlusion.specular, occlusion.diffuse,
-            c.shading.fresnel, c.shading.compensate, occlusion.indirect_specular, occlusion.indirect_diffuse,
-        )  # fmt: skip
+            normals,
+            view_dirs,
+            albedo,
+            roughness,
+            metallic,
+            light(*asked),
+            None,
+            occlusion.specular,
+            occlusion.diffuse,
+            c.shading.fresnel,
+            c.shading.compensate,
+            occlusion.indirect_specular,
+            occlusion.indirect_diffuse,
+        )
         return ShadedPoints(
-            shaded, normals, albedo, roughness, metallic, occlusion.diffuse, occlusion.specular, facing, lobe_dirs, surface
+            shaded,
+            normals,
+            albedo,
+            roughness,
+            metallic,
+            occlusion.diffuse,
+            occlusion.specular,
+            facing,
+            lobe_dirs,
+            surface,
         )
 
     def quadrature_correction(
-        self, light: EvaluatedLight, view_dirs: Tensor, points: ShadedPoints, candidates: Tensor,
+        self,
+        light: EvaluatedLight,
+        view_dirs: Tensor,
+        points: ShadedPoints,
+        candidates: Tensor,
         n_candidates: Tensor | None = None,
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+    ) -> tuple[Tensor, Tensor]:
         """The difference between the radiance by quadrature and that by the split sum.
 
         The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
@@ -257,16 +284,35 @@ class SceneModel(nn.Module):
         middle, half = self.occlusion.summed_from, 0.5 * SUMMED_BAND
         at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
         of_points = [
-            points.normals, points.albedo, points.roughness, points.metallic, points.radiance, view_dirs, points.on_surface,
+            points.normals,
+            points.albedo,
+            points.roughness,
+            points.metallic,
+            points.radiance,
+            view_dirs,
+            points.on_surface,
             points.facing.detach(),
-        ]  # fmt: skip
-        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = (x.index_select(0, at) for x in of_points)
+        ]
+        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = (
+            x.index_select(0, at) for x in of_points
+        )
         visible, sent = self.occlusion.visibility(on_surface, facing)
         cells = light.cells
         return at, summed_correction(
-            normals, view_dirs, albedo, roughness, metallic, split, share, cells.directions, cells.solid_angles, cells.radiance,
-            visible, sent, self.config.shading.compensate,
-        )  # fmt: skip
+            normals,
+            view_dirs,
+            albedo,
+            roughness,
+            metallic,
+            split,
+            share,
+            cells.directions,
+            cells.solid_angles,
+            cells.radiance,
+            visible,
+            sent,
+            self.config.shading.compensate,
+        )
 
     @property
     def sums_light(self) -> bool:

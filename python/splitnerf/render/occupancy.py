@@ -137,7 +137,9 @@ class AveragedGrid(OccupancyGrid):
 def make_grid(config: Config, hull: Tensor | None = None, device: torch.device | str = "cpu") -> OccupancyGrid:
     """The grid that the setting ``occupancy`` names."""
     if config.sampling.occupancy == "average":
-        return AveragedGrid(config.sampling.grid_resolution, config.constants.box, config.constants.min_step, hull, device)
+        return AveragedGrid(
+            config.sampling.grid_resolution, config.constants.box, config.constants.min_step, hull, device
+        )
     return OccupancyGrid(config.sampling.grid_resolution, config.constants.box, hull, device)
 
 

@@ -81,10 +81,24 @@ class AssetRenderer:
         """
         fx, fy, cx, cy = (float(value) for value in intrinsics)
         images = _core.render(
-            self._scene, **self._surface, environment=_float32(environment), camera_to_world=_float32(pose[:3]),
-            fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height, **self._options, spp=spp, max_bounces=bounces,
-            seed=seed, clamp_indirect=clamp_indirect, pixel_filter=pixel_filter, catcher_height=catcher_height,
-        )  # fmt: skip
+            self._scene,
+            **self._surface,
+            environment=_float32(environment),
+            camera_to_world=_float32(pose[:3]),
+            fx=fx,
+            fy=fy,
+            cx=cx,
+            cy=cy,
+            width=width,
+            height=height,
+            **self._options,
+            spp=spp,
+            max_bounces=bounces,
+            seed=seed,
+            clamp_indirect=clamp_indirect,
+            pixel_filter=pixel_filter,
+            catcher_height=catcher_height,
+        )
         del images["rays"]
         return images
 

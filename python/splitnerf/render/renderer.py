@@ -172,11 +172,21 @@ def find_samples(
         evaluated, n_found = packed.offsets.diff(), packed.offsets[-1]
     else:
         packed, evaluated, n_found = sample_rays(
-            rays_o, rays_d, jitter, cells, model.sdf_field.network(), step=step, s=s, anneal=anneal,
-            min_weight=c.sampling.min_weight, min_transmittance=c.constants.min_transmittance,
-            reach=DENSITY_CUTOFF / s, lipschitz=LIPSCHITZ,
-            max_samples=MAX_SAMPLES_PER_RAY, room=capacity,
-        )  # fmt: skip
+            rays_o,
+            rays_d,
+            jitter,
+            cells,
+            model.sdf_field.network(),
+            step=step,
+            s=s,
+            anneal=anneal,
+            min_weight=c.sampling.min_weight,
+            min_transmittance=c.constants.min_transmittance,
+            reach=DENSITY_CUTOFF / s,
+            lipschitz=LIPSCHITZ,
+            max_samples=MAX_SAMPLES_PER_RAY,
+            room=capacity,
+        )
     packed = packed.extended(max(0, capacity - len(packed.ray_indices)))
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes
     positions, directions, beside = place_samples(rays_o, rays_d, packed, probes, padded=capacity > 0)
@@ -211,20 +221,32 @@ def place_samples(
 
 
 def add_corrections(
-    mean: Tensor, correction: Tensor, at: Tensor, spread: ShadingSubset, ray_indices: Tensor, shares: Tensor, opacity: Tensor
+    mean: Tensor,
+    correction: Tensor,
+    at: Tensor,
+    spread: ShadingSubset,
+    ray_indices: Tensor,
+    shares: Tensor,
+    opacity: Tensor,
 ) -> Tensor:
     """The rays' colours [n_rays, 3] with corrections [m, 3] of their shaded samples `at` [m], each by the share of the ray's
     opacity that the sample's segment carries; `shares` [n_shaded] is the weight that each shaded sample stands for."""
     rays = ray_indices.index_select(0, spread.shaded.index_select(0, at))
     carried = shares.new_zeros(len(spread.leaders)).index_add(0, spread.stretch, shares)
-    part = carried.index_select(0, spread.stretch.index_select(0, at)) / opacity.index_select(0, rays).clamp(min=MIN_OPACITY)
+    part = carried.index_select(0, spread.stretch.index_select(0, at)) / opacity.index_select(0, rays).clamp(
+        min=MIN_OPACITY
+    )
     return mean.index_add(0, rays, correction * part[:, None])
 
 
 def render_rays(
-    model: SceneModel, light: EvaluatedLight, found: FoundSamples, *, shades_per_ray: int = 0,
+    model: SceneModel,
+    light: EvaluatedLight,
+    found: FoundSamples,
+    *,
+    shades_per_ray: int = 0,
     capacity: tuple[int, int] | None = None,
-) -> RenderedRays:  # fmt: skip
+) -> RenderedRays:
     """Renders rays from their samples.
 
     Args:
@@ -266,18 +288,30 @@ def render_rays(
     mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
     if model.sums_light:
         at, correction = model.quadrature_correction(
-            light,
-            view_dirs,
-            points,
-            spread.heaviest,
-            None if capacity is None else spread.sizes[1],
+            light, view_dirs, points, spread.heaviest, None if capacity is None else spread.sizes[1]
         )
         mean = add_corrections(mean, correction, at, spread, samples.ray_indices, shares, opacity.detach())
     return RenderedRays(
-        mean, c.shading.compositing == "linear", opacity, s, samples, found.evaluated, found.n_found, weights, values, field.gradient,
-        field.outputs[n : len(found.positions) - len(found.beside), 0], found.beside,
-        shaded, spread.sizes, shares, positions, normals, sdf, points,
-    )  # fmt: skip
+        mean,
+        c.shading.compositing == "linear",
+        opacity,
+        s,
+        samples,
+        found.evaluated,
+        found.n_found,
+        weights,
+        values,
+        field.gradient,
+        field.outputs[n : len(found.positions) - len(found.beside), 0],
+        found.beside,
+        shaded,
+        spread.sizes,
+        shares,
+        positions,
+        normals,
+        sdf,
+        points,
+    )
 
 
 @torch.no_grad()

@@ -82,9 +82,7 @@ def _neighbours(angles: Tensor) -> list[int]:
 
 
 @torch.no_grad()
-def depth_maps(
-    photos: GreyPhotos, hull: Tensor, box: float, most: int = MOST_VIEWS
-) -> tuple[Tensor, Tensor, Tensor]:
+def depth_maps(photos: GreyPhotos, hull: Tensor, box: float, most: int = MOST_VIEWS) -> tuple[Tensor, Tensor, Tensor]:
     """The depth of each pixel of :meth:`GreyPhotos.spread` at which its window looks most like those of neighbours.
 
     Args:
@@ -131,9 +129,14 @@ def refined_depths(
 
 
 def _swept(
-    photos: GreyPhotos, i: int, rays: tuple[Tensor, Tensor], first: Tensor, span: Tensor, step: float,
+    photos: GreyPhotos,
+    i: int,
+    rays: tuple[Tensor, Tensor],
+    first: Tensor,
+    span: Tensor,
+    step: float,
     base: Tensor | None = None,
-) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+) -> tuple[Tensor, Tensor, Tensor]:
     """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which
     is 0 where there is nothing to compare. A photo counts as unlike where its own surface, of depths `base` [n, h, w],
     hides the middle of the span."""
@@ -232,9 +235,14 @@ def _behind(photos: GreyPhotos, depths: Tensor, j: int, points: Tensor) -> tuple
 
 @torch.no_grad()
 def fused_distances(
-    photos: GreyPhotos, depths: Tensor, weights: Tensor, hull: Tensor, box: float, truncation: float,
+    photos: GreyPhotos,
+    depths: Tensor,
+    weights: Tensor,
+    hull: Tensor,
+    box: float,
+    truncation: float,
     before: Tensor | None = None,
-) -> tuple[Tensor, Tensor]:  # fmt: skip
+) -> tuple[Tensor, Tensor]:
     """[r, r, r] distances to the surface of depth maps along the rays, the mean over the photos, positive outside; and
     the mean weight of the depths that say so, 0 where none does.
 

@@ -62,9 +62,17 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
         background = torch.where(drawn.whole[:, None], at_unit_exposure(background, exposure), background)
         exposure = torch.ones_like(exposure)
     return Batch(
-        drawn.rays_o, drawn.rays_d, target, background, drawn.whole, jitter, phase, drawn.view, exposure,
+        drawn.rays_o,
+        drawn.rays_d,
+        target,
+        background,
+        drawn.whole,
+        jitter,
+        phase,
+        drawn.view,
+        exposure,
         make_probes(config, chosen, probes),
-    )  # fmt: skip
+    )
 
 
 def draw_numbers(generator: torch.Generator, counts: list[int]) -> list[Tensor]:

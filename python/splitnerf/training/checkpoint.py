@@ -131,8 +131,18 @@ def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tenso
 
 def _check_content(content: dict) -> None:
     """Raises ValueError or InputError where a value is not what the trainer writes."""
-    kinds = {"config": dict, "fingerprint": str, "step": int, "seconds": float, "n_rays": int, "meshed_at": float,
-             "previewed_at": float, "stopped": bool, "model": dict, "optimiser": dict}  # fmt: skip
+    kinds = {
+        "config": dict,
+        "fingerprint": str,
+        "step": int,
+        "seconds": float,
+        "n_rays": int,
+        "meshed_at": float,
+        "previewed_at": float,
+        "stopped": bool,
+        "model": dict,
+        "optimiser": dict,
+    }
     for key, kind in kinds.items():
         if not isinstance(content.get(key), kind):
             raise ValueError(f"{key} is missing or of another type")
@@ -215,7 +225,9 @@ def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
     if emitters is None and cached["sent"] is None:
         return
     check_tensor("the number of each emitter", emitters, (-1,), torch.int64)
-    if len(emitters) and not (emitters[0] >= 0 and emitters[-1] < n_vertices * k and (emitters[1:] > emitters[:-1]).all()):
+    if len(emitters) and not (
+        emitters[0] >= 0 and emitters[-1] < n_vertices * k and (emitters[1:] > emitters[:-1]).all()
+    ):
         raise ValueError("the numbers of the emitters do not ascend, or name vertices that are none")
     check_tensor("the light that the mesh sends", cached["sent"], (len(emitters), 3), torch.float32)
 

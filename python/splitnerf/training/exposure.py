@@ -14,7 +14,9 @@ from splitnerf.ops import srgb_to_linear
 KEEP = 0.998  # share of the sums that outlives a step
 ENOUGH = 50.0  # pixels of a photo that count as much as the start
 DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo's pixels that count
-ERROR = 0.06  # of the logarithms, as the rendering is not the object: measured 0.05 on two captures with known exposures
+ERROR = (
+    0.06  # of the logarithms, as the rendering is not the object: measured 0.05 on two captures with known exposures
+)
 COLOUR_ERROR = 0.02  # of each channel's difference from their mean: measured 0.009 on a capture of one white balance
 FARTHEST = 1.0  # of a pixel's log from the rendering's: more is no exposure
 COVERED = 0.95  # alpha and opacity of pixels that count
@@ -50,9 +52,7 @@ class PhotoExposures:
         self.factors = self.start.exp()
         self.sums = torch.zeros(len(dataset), 4, device=device)
 
-    def learn(
-        self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor, allowed: Tensor | None = None
-    ) -> None:
+    def learn(self, view: Tensor, target: Tensor, mean: Tensor, opacity: Tensor, allowed: Tensor | None = None) -> None:
         """Takes in the pixels of a step.
 
         Args:

@@ -51,7 +51,9 @@ def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) 
     """
     state = list(_state(model, optimiser))
     norms = torch._foreach_norm([value for _, value in state])
-    if math.isfinite(torch.stack(norms).sum().item()):  # waits for the device once; what has no square is looked at below
+    if math.isfinite(
+        torch.stack(norms).sum().item()
+    ):  # waits for the device once; what has no square is looked at below
         return
     found = first_not_finite(state)
     if found:

@@ -170,10 +170,14 @@ class GpuStep(Step):
         c, model = self.model.config, self.model
         since = step % light_period(c) + 1 if light_moves(c, step) else 0
         return (
-            model.sdf_field.grid.n_active, since, progress >= c.constants.priors_from, self.is_held(progress),
-            has_shape_priors(c, progress), self.mesh.made_at,
+            model.sdf_field.grid.n_active,
+            since,
+            progress >= c.constants.priors_from,
+            self.is_held(progress),
+            has_shape_priors(c, progress),
+            self.mesh.made_at,
             model.occlusion.ready,
-        )  # fmt: skip
+        )
 
     def _recorded(self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight) -> Recorded:
         batch, found = tree_map(torch.clone, (batch, found))
@@ -196,7 +200,9 @@ class GpuStep(Step):
         new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]
         with torch.no_grad():
             for dtype in {x.dtype for x in new}:  # one launch for all tensors of a type
-                torch._foreach_copy_([x for x in old if x.dtype == dtype], [x.detach() for x in new if x.dtype == dtype])
+                torch._foreach_copy_(
+                    [x for x in old if x.dtype == dtype], [x.detach() for x in new if x.dtype == dtype]
+                )
         for parameter, grad in zip(self.model.parameters(), recorded.grads):
             parameter.grad = grad
         recorded.graph.replay()

@@ -103,9 +103,14 @@ class LateOcclusion:
 
 
 def trace(
-    numbers: Tensor, wait: Callable[[], None], shapes: list[torch.Size], device: torch.device, scene: MeshScene,
-    config: Config, seed: int,
-) -> Tensor:  # fmt: skip
+    numbers: Tensor,
+    wait: Callable[[], None],
+    shapes: list[torch.Size],
+    device: torch.device,
+    scene: MeshScene,
+    config: Config,
+    seed: int,
+) -> Tensor:
     """Traces points that are on their way from a device, and gets the factors ready for the way back.
 
     Args:

@@ -84,9 +84,13 @@ class Training(TrainingState):
         keep_metrics(self.run / METRICS, self.step)
         self.observer(Event("begun", self))
         with (
-            Interrupt() as interrupt, Progress(self.progress) as bar, same_bits(c.run.deterministic),
-            tensor_cores(True), spare_processors(self.model.device), self.take_step.running(),
-        ):  # fmt: skip
+            Interrupt() as interrupt,
+            Progress(self.progress) as bar,
+            same_bits(c.run.deterministic),
+            tensor_cores(True),
+            spare_processors(self.model.device),
+            self.take_step.running(),
+        ):
             if self.step:
                 interrupt.attempt(self.preview_if_due)  # that an interruption left out
             while not self.finished and not (interrupt.asked and self.may_stop):
@@ -101,9 +105,15 @@ class Training(TrainingState):
                     bar.skip(paused)
             self.finish()
         return TrainedScene(
-            self.model, self.grid, self.mesh.scene, self.step, self.seconds, self.finished, self.step - self.resumed_at,
+            self.model,
+            self.grid,
+            self.mesh.scene,
+            self.step,
+            self.seconds,
+            self.finished,
+            self.step - self.resumed_at,
             self.exposures.found,
-        )  # fmt: skip
+        )
 
     def refresh(self) -> None:
         """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the
@@ -207,6 +217,7 @@ class Training(TrainingState):
         if self.finished:
             self.update_grid()
         self.save()
+
 
 def check_repeatable(config: Config, device: torch.device | str) -> None:
     """Raises InputError where the settings ask for equal bits on a device whose sums have no fixed order."""

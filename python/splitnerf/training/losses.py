@@ -66,7 +66,9 @@ class Terms(dict[str, Term]):
         if any(weights.values()):
             self._roots.append((values, tuple(weight or 0.0 for weight in weights.values())))
         flat = values.detach().reshape(-1)
-        self.update((name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None)
+        self.update(
+            (name, Term(weight, flat[i])) for i, (name, weight) in enumerate(weights.items()) if weight is not None
+        )
 
     def backward(self) -> None:
         """Takes the gradients of the weighted sum. The weights seed the backward pass, so that the sum itself is never
@@ -86,11 +88,18 @@ def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:
 
 
 def loss_terms(
-    model: SceneModel, light: EvaluatedLight, batch: Batch, ray: RenderedRays, scene: MeshScene | None,
-    environment: Tensor | None, generator: torch.Generator, step: int, progress: float,
+    model: SceneModel,
+    light: EvaluatedLight,
+    batch: Batch,
+    ray: RenderedRays,
+    scene: MeshScene | None,
+    environment: Tensor | None,
+    generator: torch.Generator,
+    step: int,
+    progress: float,
     seen: SeenLight | None = None,
     late: Callable[[RenderedRays, MeshScene, Tensor, int], Tensor | None] | None = None,
-) -> Terms:  # fmt: skip
+) -> Terms:
     """The terms of the loss by name; the colour's term comes first.
 
     Args:
@@ -185,10 +194,12 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     asked = torch.cat([directions, own, queries])
     g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
-    sums = torch.stack([
-        prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
-        for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
-    ])  # fmt: skip
+    sums = torch.stack(
+        [
+            prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
+            for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
+        ]
+    )
     error = prefiltered - torch.cat([lobes.view(n_narrow, c.constants.light_lobe_samples, 3).mean(1), sums.mean(0)])
     if n_sets == 2:
         noise = ((sums[0] - sums[1]) / 2).square().sum().item()
@@ -266,7 +277,9 @@ class SeenLight:
         """
         texels = light.maps.partition(SEEN_TEXELS, self._device)
         if self._target is None:
-            radiance, known = (torch.from_numpy(x) for x in seen_at(self._surroundings, texels.directions.cpu().numpy()))
+            radiance, known = (
+                torch.from_numpy(x) for x in seen_at(self._surroundings, texels.directions.cpu().numpy())
+            )
             weights = known.to(self._device) * texels.solid_angles / (4 * math.pi)
             self._target, self._weights = radiance.to(self._device).clamp(min=RADIANCE_FLOOR).log(), weights
         apart = (texels.radiance.clamp(min=RADIANCE_FLOOR).log() - self._target) / SEEN_DEVIATION
@@ -345,9 +358,15 @@ def traced_factors(
     """The factors o_d and o_s of points, see :func:`splitnerf.ops.occlusion_factors`."""
     n_rays, offset = config.constants.occlusion_rays, config.constants.occlusion_offset
     return occlusion_factors(
-        scene, *points, environment, n_diffuse_rays=n_rays, n_specular_rays=n_rays, offset=offset, seed=seed,
+        scene,
+        *points,
+        environment,
+        n_diffuse_rays=n_rays,
+        n_specular_rays=n_rays,
+        offset=offset,
+        seed=seed,
         n_channels=config.occlusion.channels,
-    )  # fmt: skip
+    )
 
 
 def occlusion_error(

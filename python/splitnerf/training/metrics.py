@@ -38,12 +38,19 @@ class StepLog:
             self.psnr = psnr if self.psnr is None else 0.95 * self.psnr + 0.05 * psnr
         n_rays, evaluated = numbers.n_rays, max(1, numbers.evaluated)
         self.pending = {
-            "step": numbers.step, "seconds": round(seconds, 3), "progress": progress, "loss": numbers.loss,
+            "step": numbers.step,
+            "seconds": round(seconds, 3),
+            "progress": progress,
+            "loss": numbers.loss,
             **{f"loss_{name}": weight * numbers.values[name] for name, weight in numbers.weights.items()},
-            "psnr": self.psnr, "rays": n_rays, "samples_per_ray": numbers.evaluated / n_rays,
-            "kept": numbers.counts.samples / evaluated, "shaded": numbers.counts.shaded / evaluated,
-            "s": numbers.s, **others,
-        }  # fmt: skip
+            "psnr": self.psnr,
+            "rays": n_rays,
+            "samples_per_ray": numbers.evaluated / n_rays,
+            "kept": numbers.counts.samples / evaluated,
+            "shaded": numbers.counts.shaded / evaluated,
+            "s": numbers.s,
+            **others,
+        }
         return numbers.step % LOG_EVERY == 0 or numbers.step <= LOG_EVERY
 
     def write(self) -> dict[str, object]:

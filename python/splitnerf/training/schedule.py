@@ -52,9 +52,10 @@ def make_optimiser(model: SceneModel, config: Config) -> AdamW:
     apart = {id(p) for p in [model.variance, *texels, *table]}
     groups = [
         ([p for p in model.parameters() if id(p) not in apart], c.constants.learning_rate, WEIGHT_DECAY),
-        ([model.variance], VARIANCE_RATE, 0.0), (texels, LIGHT_RATE, 0.0),
+        ([model.variance], VARIANCE_RATE, 0.0),
+        (texels, LIGHT_RATE, 0.0),
         (table, c.constants.learning_rate, WEIGHT_DECAY),
-    ]  # fmt: skip
+    ]
     groups = [
         {"params": params, "rate": rate, "lr": rate, "weight_decay": decay, "sparse": params is table}
         for params, rate, decay in groups

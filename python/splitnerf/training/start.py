@@ -35,19 +35,22 @@ NEAR_CELLS = 4.0  # from the surface to the points at which the field is compare
 POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
-CLEAR_SHARE, CLEAR_SHARE_FINE = 0.25, 0.4  # of the object's pixels that must be clear; finer windows are clear by chance, too
+CLEAR_SHARE, CLEAR_SHARE_FINE = (
+    0.25,
+    0.4,
+)  # of the object's pixels that must be clear; finer windows are clear by chance, too
 FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing, and a sphere does as well or better
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
 # Edge of the photos; reach of the depths around the surface, their step, the truncation, scene units; blur in cells.
-PASSES = (
-    *[(FIRST_EDGE, 0.3, 0.04, 0.12, 1.0)] * 4,
-    (EDGE, 0.15, 0.025, 0.08, 0.7),
-    (EDGE, 0.06, 0.0125, 0.06, 0.7),
-)
+PASSES = (*[(FIRST_EDGE, 0.3, 0.04, 0.12, 1.0)] * 4, (EDGE, 0.15, 0.025, 0.08, 0.7), (EDGE, 0.06, 0.0125, 0.06, 0.7))
 # The same for surfaces whose texture shows near the photos' own size alone; the photos that get depths, and those that tell.
 FINE_EDGE, FINE_VIEWS, FINE_PROBES = 300, 25, 6
-FINE_PASSES = ((FINE_EDGE, 0.2, 0.03, 0.12, 1.0), (FINE_EDGE, 0.15, 0.025, 0.1, 1.0), (FINE_EDGE, 0.06, 0.0125, 0.06, 0.7))
+FINE_PASSES = (
+    (FINE_EDGE, 0.2, 0.03, 0.12, 1.0),
+    (FINE_EDGE, 0.15, 0.025, 0.1, 1.0),
+    (FINE_EDGE, 0.06, 0.0125, 0.06, 0.7),
+)
 FIT_STEPS, FIT_POINTS, FIT_RATE = 200, 8192, 0.01
 
 

@@ -48,18 +48,20 @@ class TrainingState:
         observer: Learns what happens, and may request something between two steps.
     """
 
-    def __init__(
-        self, dataset: Dataset, config: Config, run: Path, device: torch.device, observer: Observer = NOBODY
-    ):
+    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device, observer: Observer = NOBODY):
         c = self.config = config
-        if device.type == "cuda" and c.sampling.min_weight == 0 and not c.run.cuda_graphs:  # each step has tensors of new sizes
+        if (
+            device.type == "cuda" and c.sampling.min_weight == 0 and not c.run.cuda_graphs
+        ):  # each step has tensors of new sizes
             let_segments_grow()
         self.dataset, self.run, self.observer = dataset, run, observer
         self.fingerprint = dataset_fingerprint(dataset)
         torch.manual_seed(c.run.seed)
         self.generator = torch.Generator(device).manual_seed(c.run.seed)
         self.photos = training_photos(dataset, c)
-        self.source = source = PixelSource(self.photos, c.constants.foreground_share, self.generator, c.losses.edge_pixels)
+        self.source = source = PixelSource(
+            self.photos, c.constants.foreground_share, self.generator, c.losses.edge_pixels
+        )
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
@@ -117,19 +119,33 @@ class TrainingState:
         self.saved_at = self.seconds
         held = self.take_step.start if self.progress < HELD_UNTIL else None
         save_checkpoint(
-            self.run / "checkpoint.pt", config=self.config, fingerprint=self.fingerprint,
+            self.run / "checkpoint.pt",
+            config=self.config,
+            fingerprint=self.fingerprint,
             state=dict(
-                step=self.step, seconds=self.seconds, n_rays=self.n_rays, previewed_at=self.previewed_at, stopped=self.stopped,
-                psnr_mean=self.log.psnr, exposures=self.exposures.sums, model=self.model.state_dict(),
+                step=self.step,
+                seconds=self.seconds,
+                n_rays=self.n_rays,
+                previewed_at=self.previewed_at,
+                stopped=self.stopped,
+                psnr_mean=self.log.psnr,
+                exposures=self.exposures.sums,
+                model=self.model.state_dict(),
                 optimiser={"state": self.optimiser.state_dict()["state"]},  # the rates are those of settings and step
-                device=self.generator.device.type, generator=self.generator.get_state(),
-                torch_generator=torch.get_rng_state(), occupancy=self.grid.values, cells=self.grid.cells,
-                environment=self.environment, light_noise=self.model.light.loss_samples.state(),
+                device=self.generator.device.type,
+                generator=self.generator.get_state(),
+                torch_generator=torch.get_rng_state(),
+                occupancy=self.grid.values,
+                cells=self.grid.cells,
+                environment=self.environment,
+                light_noise=self.model.light.loss_samples.state(),
                 occlusion_light=self.model.occlusion.cached_light(),
-                box_from_world=torch.from_numpy(self.dataset.box_from_world), start=None if held is None else held.state(),
-                cameras=Cameras.of(self.dataset)._asdict(), **self.mesh.state(),
+                box_from_world=torch.from_numpy(self.dataset.box_from_world),
+                start=None if held is None else held.state(),
+                cameras=Cameras.of(self.dataset)._asdict(),
+                **self.mesh.state(),
             ),
-        )  # fmt: skip
+        )
 
     def restore(self) -> None:
         """Restores the state from the run's checkpoint."""

@@ -110,9 +110,16 @@ class PendingNumbers:
         )
         counts = Capacity(samples, shaded, segments)
         return StepNumbers(
-            self.step, self.n_rays, dict(zip(self.weights, values)), self.weights, norm, counts, s, evaluated,
+            self.step,
+            self.n_rays,
+            dict(zip(self.weights, values)),
+            self.weights,
+            norm,
+            counts,
+            s,
+            evaluated,
             self.capacity.holds(counts),
-        )  # fmt: skip
+        )
 
 
 class Step:
@@ -139,9 +146,15 @@ class Step:
     late: LateOcclusion | None = None
 
     def __init__(
-        self, model: SceneModel, grid: OccupancyGrid, mesh: SurfaceMesh, generator: torch.Generator,
-        optimiser: AdamW | None = None, exposures: PhotoExposures | None = None, seen: losses.SeenLight | None = None,
-    ):  # fmt: skip
+        self,
+        model: SceneModel,
+        grid: OccupancyGrid,
+        mesh: SurfaceMesh,
+        generator: torch.Generator,
+        optimiser: AdamW | None = None,
+        exposures: PhotoExposures | None = None,
+        seen: losses.SeenLight | None = None,
+    ):
         self.model, self.grid, self.mesh, self.generator = model, grid, mesh, generator
         self.optimiser, self.exposures, self.seen = optimiser, exposures, seen
         self.capacity, self.skipped, self._skipped_in_a_row = Capacity(), 0, 0
@@ -191,7 +204,9 @@ class Step:
     def fetch(self, step: int, batch: Batch, ray: RenderedRays, terms: Terms) -> PendingNumbers:
         """Starts to fetch the numbers of a step whose gradients are at the parameters."""
         gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
-        numbers = torch.stack([*(term.value for term in terms.values()), torch.nn.utils.get_total_norm(gradients, foreach=True)])
+        numbers = torch.stack(
+            [*(term.value for term in terms.values()), torch.nn.utils.get_total_norm(gradients, foreach=True)]
+        )
         counts = torch.cat([ray.n_found[None], ray.sizes, ray.evaluated.sum()[None]])
         numbers = torch.cat([numbers, counts, ray.s[None]]).detach()
         allowed = (numbers.abs() < _limits(len(terms), self.capacity, numbers.device)).all()  # false for NaN
@@ -243,17 +258,32 @@ class Step:
         return find_samples(self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s)
 
     def differentiate(
-        self, batch: Batch, found: FoundSamples, light: EvaluatedLight, environment: Tensor | None, step: int,
-        progress: float, capacity: tuple[int, int] | None = None,
-    ) -> tuple[RenderedRays, Terms]:  # fmt: skip
+        self,
+        batch: Batch,
+        found: FoundSamples,
+        light: EvaluatedLight,
+        environment: Tensor | None,
+        step: int,
+        progress: float,
+        capacity: tuple[int, int] | None = None,
+    ) -> tuple[RenderedRays, Terms]:
         """Renders found samples and takes the gradients; for ``capacity`` see
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
         ray = render_rays(self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity)
         terms = losses.loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen,
+            self.model,
+            light,
+            batch,
+            ray,
+            self.mesh.scene,
+            environment,
+            self.generator,
+            step,
+            progress,
+            self.seen,
             None if self.late is None else self.late.loss,
-        )  # fmt: skip
+        )
         if self.is_held(progress):
             terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
             drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]

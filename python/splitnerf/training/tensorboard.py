@@ -46,10 +46,14 @@ class TensorBoard:
             self._begin(event.training.step)
         elif event.kind == "logged":
             numbers = {name: float(value) for name, value in event.line.items() if name != "step" and value is not None}
-            self._write(lambda writer: [writer.add_scalar(name, value, event.line["step"]) for name, value in numbers.items()])
+            self._write(
+                lambda writer: [writer.add_scalar(name, value, event.line["step"]) for name, value in numbers.items()]
+            )
         elif event.kind == "previewed":
             pixels, step = np.ascontiguousarray(read_image(event.path)[..., :3]), event.training.step
-            self._write(lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC"))
+            self._write(
+                lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC")
+            )
 
     def _begin(self, step: int) -> None:
         """Steps of an earlier file after the one from which the run goes on come again.
@@ -60,7 +64,9 @@ class TensorBoard:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{self._folder}: cannot be made ({reason(error)}); give --tensorboard another folder") from None
+            raise InputError(
+                f"{self._folder}: cannot be made ({reason(error)}); give --tensorboard another folder"
+            ) from None
         self._writer = self._make(str(self._folder), purge_step=step + 1)
 
     def __exit__(self, *exception) -> None:

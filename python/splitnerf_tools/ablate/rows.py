@@ -13,7 +13,12 @@ FULL = "full"
 # The settings that split sum and predicted occlusion need; preset `paper` has them, so that a row changes one setting.
 SPLIT: dict[str, object] = {"shading.method": "split"}
 BY_MLP = SPLIT | {"occlusion.kind": "mlp"}
-SUMMED: dict[str, object] = {"shading.method": "summed", "occlusion.kind": "bits", "shading.compositing": "linear", "shading.fresnel": "exact"}
+SUMMED: dict[str, object] = {
+    "shading.method": "summed",
+    "occlusion.kind": "bits",
+    "shading.compositing": "linear",
+    "shading.fresnel": "exact",
+}
 
 # The paper's own ablations (its table of relighting and albedo).
 PAPER: dict[str, dict[str, object]] = {
@@ -45,7 +50,11 @@ SWITCHES: dict[str, dict[str, object]] = {
     "no material entropy": {"losses.entropy_weight": 0.0},
     "dark metals allowed": {"losses.dark_metal_weight": 0.0},
     "metals by halves": {"losses.binary_metal_weight": 0.0},
-    "no metal loss at all": {"losses.metal_weight": 0.0, "losses.binary_metal_weight": 0.0, "losses.dark_metal_weight": 0.0},
+    "no metal loss at all": {
+        "losses.metal_weight": 0.0,
+        "losses.binary_metal_weight": 0.0,
+        "losses.dark_metal_weight": 0.0,
+    },
 }
 # The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {

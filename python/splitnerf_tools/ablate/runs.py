@@ -12,6 +12,7 @@ from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
 from splitnerf.evaluate.jobs import Protocol
 from splitnerf.pipeline import evaluate_run, reconstruct
+
 from splitnerf_tools.ablate.rows import Row
 from splitnerf_tools.ablate.scores import CLOSE, Score, differences, score_of
 

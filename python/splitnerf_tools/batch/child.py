@@ -64,7 +64,18 @@ def train_scene(work: Work) -> Outcome:
     stopped = False
     if not _free(Path(work.run)):
         return Outcome(None, f"{work.run}: is in use by another program", False)
-    command = [sys.executable, "-m", "splitnerf", "train", work.data, "--out", work.run, "--resume", "auto", *work.options]
+    command = [
+        sys.executable,
+        "-m",
+        "splitnerf",
+        "train",
+        work.data,
+        "--out",
+        work.run,
+        "--resume",
+        "auto",
+        *work.options,
+    ]
     hidden = ("RAY_AUTH_TOKEN", "RAY_AUTH_MODE")  # not needed there
     environment = {key: value for key, value in os.environ.items() if key not in hidden}
     environment |= {"OMP_NUM_THREADS": str(work.threads), "PYTHONUNBUFFERED": "1"}
@@ -74,9 +85,13 @@ def train_scene(work: Work) -> Outcome:
         log.flush()
         begin = log.tell()
         child = subprocess.Popen(
-            [sys.executable, "-m", "splitnerf_tools.batch.child", str(os.getpid()), *command], stdin=subprocess.DEVNULL,
-            stdout=log, stderr=log, env=environment, start_new_session=True,
-        )  # fmt: skip
+            [sys.executable, "-m", "splitnerf_tools.batch.child", str(os.getpid()), *command],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            env=environment,
+            start_new_session=True,
+        )
         try:
             while child.poll() is None:
                 time.sleep(POLL)

@@ -19,6 +19,7 @@ from typing import TextIO
 from splitnerf.errors import InputError, plain
 from splitnerf.memory import memory_bytes
 from splitnerf.progress import ended_by_signals
+
 from splitnerf_tools.batch.scenes import LOGS
 from splitnerf_tools.doctor.machine import GIB, TRAINING_GIB, processors
 
@@ -62,9 +63,15 @@ class Share:
 
 
 def share_of(
-    machines: Sequence[Mapping[str, float]], n_scenes: int, *, cores: float | None, gpus: float | None,
-    memory: float | None, photos: float | None = None, whole_gpu: bool = False,
-) -> Share:  # fmt: skip
+    machines: Sequence[Mapping[str, float]],
+    n_scenes: int,
+    *,
+    cores: float | None,
+    gpus: float | None,
+    memory: float | None,
+    photos: float | None = None,
+    whole_gpu: bool = False,
+) -> Share:
     """The share of each of some scenes.
 
     Args:
@@ -124,10 +131,15 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
                         _connect(ray, address)
                     else:
                         ray.init(
-                            address="local", num_cpus=processors(), object_store_memory=OBJECT_STORE, include_dashboard=False,
-                            logging_level="error", log_to_driver=False, _temp_dir=own,
+                            address="local",
+                            num_cpus=processors(),
+                            object_store_memory=OBJECT_STORE,
+                            include_dashboard=False,
+                            logging_level="error",
+                            log_to_driver=False,
+                            _temp_dir=own,
                             _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
-                        )  # fmt: skip
+                        )
                 with ended_by_signals():  # Ray replaced the handler of SIGTERM
                     yield ray
             finally:
@@ -161,7 +173,9 @@ def _connect(ray: ModuleType, address: str) -> None:
         ray.init(address=address, logging_level="error", log_to_driver=False)
     except (OSError, ValueError, OverflowError, ray.exceptions.RayError) as error:
         why = plain(str(error).strip()).partition(". ")[0]
-        raise InputError(f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`") from None
+        raise InputError(
+            f"--address {address}: no Ray cluster answers ({why}); start one by `ray start --head`"
+        ) from None
 
 
 def remove_folder(folder: str) -> None:

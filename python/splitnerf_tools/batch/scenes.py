@@ -11,6 +11,7 @@ from pathlib import Path
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError, plain
 from splitnerf.files import atomic_path
+
 from splitnerf_tools.ablate.scores import value_at
 
 STATE, TABLE, LOGS = "batch.json", "batch.md", "logs"  # in the batch's folder, beside the runs
@@ -20,10 +21,12 @@ MOST_LETTERS = 80  # of a name
 LONGEST = 28  # letters of a name on the terminal
 # Title, keys in evaluation.json, format.
 COLUMNS = (
-    ("views", ("novel_view", "psnr"), "{:.2f}"), ("relit", ("relight", "psnr"), "{:.2f}"),
-    ("albedo", ("albedo", "psnr"), "{:.2f}"), ("normals", ("normal_mae_deg",), "{:.1f}"),
+    ("views", ("novel_view", "psnr"), "{:.2f}"),
+    ("relit", ("relight", "psnr"), "{:.2f}"),
+    ("albedo", ("albedo", "psnr"), "{:.2f}"),
+    ("normals", ("normal_mae_deg",), "{:.1f}"),
     ("light", ("light_psnr",), "{:.2f}"),
-)  # fmt: skip
+)
 HEAD = ["state", "steps", "minutes", *(title for title, *_ in COLUMNS)]
 UNITS = "PSNR in dB, normals in degrees"
 

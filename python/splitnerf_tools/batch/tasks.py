@@ -10,6 +10,7 @@ from types import ModuleType
 
 from splitnerf.errors import plain
 from splitnerf.training.metrics import METRICS, read_metrics
+
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import GB, Share
 from splitnerf_tools.batch.scenes import DONE, FAILED, LOGS, REFUSED, STOPPED, WAITING, Scene, keep_scenes

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
+
 from splitnerf_tools.bench.provenance import header, provenance
 
 COLUMNS = 3  # charts in a row of a picture
@@ -115,14 +116,34 @@ def write_csv(path: Path, facts: dict[str, str], rows: Iterable[Sequence[object]
 
 
 def csv_rows(charts: Sequence[Chart]) -> Iterator[list[object]]:
-    yield ["chart", "series", "variant", "cost", "low", "high", "cost_unit", "error", "error_unit", "on_front",
-           "default"]  # fmt: skip
+    yield [
+        "chart",
+        "series",
+        "variant",
+        "cost",
+        "low",
+        "high",
+        "cost_unit",
+        "error",
+        "error_unit",
+        "on_front",
+        "default",
+    ]
     for chart in charts:
         front = chart.front()
         for p in chart.points:
             numbers = [f"{v:.6g}" for v in (p.cost, p.low, p.high)]
-            yield [chart.title, p.series, p.variant, *numbers, chart.cost, f"{p.error:.6g}", chart.error,
-                   int(p in front), int(p.default)]  # fmt: skip
+            yield [
+                chart.title,
+                p.series,
+                p.variant,
+                *numbers,
+                chart.cost,
+                f"{p.error:.6g}",
+                chart.error,
+                int(p in front),
+                int(p.default),
+            ]
 
 
 def markdown(result: Result, facts: dict[str, str]) -> str:
@@ -172,8 +193,9 @@ def draw(result: Result, path: Path) -> None:
             points = [p for p in chart.points if p.series == name]
             colour, costs = COLOURS[names.index(name) % len(COLOURS)], [p.cost for p in points]
             spread = [[p.cost - p.low for p in points], [p.high - p.cost for p in points]]
-            handles[name] = axes.errorbar(costs, [p.error for p in points], xerr=spread, marker="o", markersize=4,
-                                          linewidth=1, color=colour)  # fmt: skip
+            handles[name] = axes.errorbar(
+                costs, [p.error for p in points], xerr=spread, marker="o", markersize=4, linewidth=1, color=colour
+            )
         front = chart.front()
         axes.step(
             [p.cost for p in front], [p.error for p in front], where="post", color="#bbbbbb", linewidth=5, zorder=0

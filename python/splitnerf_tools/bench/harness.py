@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
+from splitnerf.errors import CheckFailed
 from torch import Tensor
 
-from splitnerf.errors import CheckFailed
 from splitnerf_tools.bench.charts import Chart, Point, write_result
 
 ROUNDS, QUICK_ROUNDS = 15, 7
@@ -104,9 +104,14 @@ def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:
 
 
 def chart_of(
-    title: str, cost: str, error: str, times: Times | Mapping[tuple[str, str], Quartiles],
-    errors: Mapping[tuple[str, str], float], default: Collection[tuple[str, str]], scale: float = 1e3,
-) -> Chart:  # fmt: skip
+    title: str,
+    cost: str,
+    error: str,
+    times: Times | Mapping[tuple[str, str], Quartiles],
+    errors: Mapping[tuple[str, str], float],
+    default: Collection[tuple[str, str]],
+    scale: float = 1e3,
+) -> Chart:
     """Times against errors.
 
     Args:

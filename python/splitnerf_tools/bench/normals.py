@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import torch
+from splitnerf.fields import SdfField
+from splitnerf.ops import HashGridSpec
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.fields import SdfField
-from splitnerf.ops import HashGridSpec
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved
 

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import torch
 import trimesh
-from torch import Tensor
-from torch.nn import functional as F
-
 from splitnerf.config import preset
 from splitnerf.fields.light import EvaluatedLight
 from splitnerf.fields.occlusion import OcclusionQuery
 from splitnerf.fields.visibility import VisibilityBits
 from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe
+from torch import Tensor
+from torch.nn import functional as F
+
 from splitnerf_tools.bench.charts import Chart, Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, rms
 from splitnerf_tools.bench.subjects import MapLight, armadillo, bumpy_sphere, drjit_ready, lights, peer
@@ -23,8 +23,14 @@ OFFSET = 0.0125
 ROUGHNESS = 0.3
 ENVIRONMENT_HEIGHT = 128
 DISAGREEMENT = 1e-3  # share of rays that two tracers may answer differently: they graze a triangle
-SOURCES = ("cpp/*occlusion*", "cpp/*visibility*", "cpp/*scene*", "python/splitnerf/ops/occlusion.py",
-           "python/splitnerf/ops/visibility.py", "python/splitnerf/fields/visibility.py")  # fmt: skip
+SOURCES = (
+    "cpp/*occlusion*",
+    "cpp/*visibility*",
+    "cpp/*scene*",
+    "python/splitnerf/ops/occlusion.py",
+    "python/splitnerf/ops/visibility.py",
+    "python/splitnerf/fields/visibility.py",
+)
 LARGE = 500  # columns and rows of the mesh of 500k triangles
 
 
@@ -50,9 +56,18 @@ class SurfacePoints:
 
     def traced(self, n_diffuse: int, n_specular: int, seed: int = 0) -> tuple[Tensor, Tensor]:
         return occlusion_factors(
-            self.scene, self.positions, self.normals, self.axes, self.roughness, self.environment, n_diffuse_rays=n_diffuse,
-            n_specular_rays=n_specular, offset=OFFSET, seed=seed, n_channels=3,
-        )  # fmt: skip
+            self.scene,
+            self.positions,
+            self.normals,
+            self.axes,
+            self.roughness,
+            self.environment,
+            n_diffuse_rays=n_diffuse,
+            n_specular_rays=n_specular,
+            offset=OFFSET,
+            seed=seed,
+            n_channels=3,
+        )
 
 
 def run(quick: bool, rounds: int) -> Result:
@@ -103,14 +118,21 @@ def error_charts(light_name: str, points: SurfacePoints, quick: bool, rounds: in
     with torch.no_grad():
         errors = {key: [rms(a - b) for a, b in zip(call(), true)] for key, call in calls.items()}
         times = interleaved(calls, rounds)
-    cost, default = f"ms for {len(points.positions)} points, both factors", f"k = {preset('cpu').constants.occlusion_directions}"
+    cost, default = (
+        f"ms for {len(points.positions)} points, both factors",
+        f"k = {preset('cpu').constants.occlusion_directions}",
+    )
     return [
         chart_of(
-            f"{factor}, {light_name} light", cost, "RMS error", times, {key: pair[k] for key, pair in errors.items()},
+            f"{factor}, {light_name} light",
+            cost,
+            "RMS error",
+            times,
+            {key: pair[k] for key, pair in errors.items()},
             {("bits", default)},
         )
         for k, factor in enumerate(("o_d", f"o_s at roughness {ROUGHNESS:g}"))
-    ]  # fmt: skip
+    ]
 
 
 class EnvironmentOf:
@@ -170,10 +192,14 @@ def ray_rates(name: str, points: SurfacePoints, quick: bool, rounds: int) -> tup
     above = float(((directions.view(n, -1, 3) * points.normals[:, None]).sum(-1) > 0).float().mean())
     what = {ours: "rays made in the lattice's order, those above the horizon traced and counted, weighed and summed"}
     rows = [
-        [name, call, f"{(above if call == ours else 1) * len(origins) / times[call].median / 1e6:.1f}",
-         what.get(call, "tracing of given rays, independent of one another")]
+        [
+            name,
+            call,
+            f"{(above if call == ours else 1) * len(origins) / times[call].median / 1e6:.1f}",
+            what.get(call, "tracing of given rays, independent of one another"),
+        ]
         for call in calls
-    ]  # fmt: skip
+    ]
     findings = []
     for call in (c for c in calls if "splitnerf" not in c):
         ratio = times.ratio(call, ours)

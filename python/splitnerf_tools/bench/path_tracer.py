@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-
 from splitnerf import _core
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
+
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import Quartiles, chart_of, check, interleaved, rms
 from splitnerf_tools.bench.subjects import bumpy_sphere, data_folder, drjit_ready, lights, peer
@@ -62,8 +62,9 @@ def run(quick: bool, rounds: int) -> Result:
         findings.append(f"converged images of splitnerf and {way} differ by {apart:.4f} (RMS)")
     errors = {
         (way, f"{n} spp"): float(np.mean([error_of(render(n, seed), means[way]) for seed in range(SEEDS)]))
-        for way, render in renderers.items() for n in samples
-    }  # fmt: skip
+        for way, render in renderers.items()
+        for n in samples
+    }
     # One renderer after the other: Mitsuba's variants are switched for the whole process, which takes time.
     times: dict[tuple[str, str], Quartiles] = {}
     for way, render in renderers.items():
@@ -121,10 +122,26 @@ def our_renderer(asset: Asset, light: np.ndarray, size: int) -> Render:
 
     def render(spp: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
         out = _core.render(
-            scene, np.ones((n, 3), np.float32), np.ones(n, np.float32), np.ones(n, np.float32), light, POSE[:3].astype(np.float32), focal,
-            focal, size / 2, size / 2, size, size, normals=asset.normals, materials=materials,
-            material_ids=asset.material_ids, uv=asset.uv, spp=spp, max_bounces=SCATTERINGS - 1, seed=seed,
-        )  # fmt: skip
+            scene,
+            np.ones((n, 3), np.float32),
+            np.ones(n, np.float32),
+            np.ones(n, np.float32),
+            light,
+            POSE[:3].astype(np.float32),
+            focal,
+            focal,
+            size / 2,
+            size / 2,
+            size,
+            size,
+            normals=asset.normals,
+            materials=materials,
+            material_ids=asset.material_ids,
+            uv=asset.uv,
+            spp=spp,
+            max_bounces=SCATTERINGS - 1,
+            seed=seed,
+        )
         return out["radiance"], out["alpha"]
 
     return render
@@ -136,23 +153,39 @@ def mitsuba_renderer(variant: str, asset: Asset, light: np.ndarray, size: int) -
 
     mi.set_variant(variant)
     drjit.set_thread_count(torch.get_num_threads())
-    scene = mi.load_dict({
-        "type": "scene", "mesh": mitsuba_mesh(mi, asset),
-        "integrator": {"type": "path", "max_depth": SCATTERINGS + 1, "rr_depth": SCATTERINGS, "hide_emitters": True},
-        # Its maps have the pole along +y; u runs as Blender's after a quarter turn.
-        "light": {
-            "type": "envmap", "bitmap": mi.Bitmap(light),
-            "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], 90) @ mi.ScalarTransform4f().rotate([1, 0, 0], 90),
-        },
-        "sensor": {
-            "type": "perspective", "fov": float(np.degrees(ANGLE_X)), "fov_axis": "x",
-            # Its cameras look along +z with x to the left.
-            "to_world": mi.ScalarTransform4f(POSE)
-            @ mi.ScalarTransform4f().scale([-1, 1, -1]),
-            "film": {"type": "hdrfilm", "width": size, "height": size, "pixel_format": "rgba", "rfilter": {"type": "box"}},
-            "sampler": {"type": "multijitter", "sample_count": 64},
-        },
-    })  # fmt: skip
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "mesh": mitsuba_mesh(mi, asset),
+            "integrator": {
+                "type": "path",
+                "max_depth": SCATTERINGS + 1,
+                "rr_depth": SCATTERINGS,
+                "hide_emitters": True,
+            },
+            # Its maps have the pole along +y; u runs as Blender's after a quarter turn.
+            "light": {
+                "type": "envmap",
+                "bitmap": mi.Bitmap(light),
+                "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], 90) @ mi.ScalarTransform4f().rotate([1, 0, 0], 90),
+            },
+            "sensor": {
+                "type": "perspective",
+                "fov": float(np.degrees(ANGLE_X)),
+                "fov_axis": "x",
+                # Its cameras look along +z with x to the left.
+                "to_world": mi.ScalarTransform4f(POSE) @ mi.ScalarTransform4f().scale([-1, 1, -1]),
+                "film": {
+                    "type": "hdrfilm",
+                    "width": size,
+                    "height": size,
+                    "pixel_format": "rgba",
+                    "rfilter": {"type": "box"},
+                },
+                "sampler": {"type": "multijitter", "sample_count": 64},
+            },
+        }
+    )
 
     def render(spp: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
         if mi.variant() != variant:
@@ -174,11 +207,12 @@ def mitsuba_mesh(mi, asset: Asset):
 
     orm = material.roughness_metallic_texture
     bsdf = {
-        "type": "principled", "specular": 0.5,
+        "type": "principled",
+        "specular": 0.5,
         "base_color": texture(material.albedo_texture, material.albedo, 3),
         "roughness": texture(None if orm is None else orm[..., :1], material.roughness, 1),
         "metallic": texture(None if orm is None else orm[..., 1:], material.metallic, 1),
-    }  # fmt: skip
+    }
     properties = mi.Properties()
     properties["mesh_bsdf"] = mi.load_dict({"type": "twosided", "bsdf": bsdf})
     counts = len(asset.vertices), len(asset.triangles)

@@ -6,9 +6,6 @@ import math
 from collections.abc import Callable
 
 import torch
-from torch import Tensor
-from torch.nn import functional as F
-
 from splitnerf import _core
 from splitnerf.config import Config, preset
 from splitnerf.ops import (
@@ -19,6 +16,9 @@ from splitnerf.ops import (
     sh_projection,
     zonal_factors,
 )
+from torch import Tensor
+from torch.nn import functional as F
+
 from splitnerf_tools.bench.charts import Chart, Result
 from splitnerf_tools.bench.harness import chart_of, interleaved
 from splitnerf_tools.bench.subjects import MapLight, cell_means, lights, pyramid_of
@@ -30,8 +30,13 @@ TRUTH_CHUNK = 1 << 22
 QUADRATURE_FROM = 0.1  # roughness
 HARMONIC_RESOLUTION, ZONAL_ROWS = 64, 129
 HARMONICS = "spherical harmonics"
-SOURCES = ("cpp/*prefilter*", "cpp/*light*", "python/splitnerf/ops/light.py", "python/splitnerf/ops/light_pyramid.py",
-           "python/splitnerf/fields/light_pyramid.py")  # fmt: skip
+SOURCES = (
+    "cpp/*prefilter*",
+    "cpp/*light*",
+    "python/splitnerf/ops/light.py",
+    "python/splitnerf/ops/light_pyramid.py",
+    "python/splitnerf/fields/light_pyramid.py",
+)
 NARROWEST = 0.1  # least roughness at which the harmonics are measured
 
 Estimate = Callable[[Tensor, Tensor], Tensor]

@@ -10,9 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import torch
-
 import splitnerf
+import torch
 from splitnerf import _core
 
 ROOT = Path(__file__).parents[3]  # root of the checkout, if the package is in one
@@ -61,12 +60,18 @@ def provenance(sources: Sequence[str], command: str | None = None, root: Path = 
         root: The checkout.
     """
     return {
-        "processor": processor_name(), "threads": str(torch.get_num_threads()), "kernels": _core.instruction_set(),
-        "Embree": _core.embree_version() or "none", "splitnerf": splitnerf.__version__,
-        "torch": torch.__version__, "python": platform.python_version(), "commit": commit(sources, root),
+        "processor": processor_name(),
+        "threads": str(torch.get_num_threads()),
+        "kernels": _core.instruction_set(),
+        "Embree": _core.embree_version() or "none",
+        "splitnerf": splitnerf.__version__,
+        "torch": torch.__version__,
+        "python": platform.python_version(),
+        "commit": commit(sources, root),
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "command": f"`{command or command_line()}`", "measures": f"`{' '.join(sources)}`",
-    }  # fmt: skip
+        "command": f"`{command or command_line()}`",
+        "measures": f"`{' '.join(sources)}`",
+    }
 
 
 def header(facts: dict[str, str]) -> str:

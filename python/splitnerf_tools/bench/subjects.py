@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import torch
 import trimesh
-from torch import Tensor
-from torch.nn import functional as F
-
 from splitnerf.data.environment import read_environment
 from splitnerf.fields import LightPyramid
 from splitnerf.notes import note
+from torch import Tensor
+from torch.nn import functional as F
 
 # Their brightest ten-thousandth of the sphere sends less than 1 %, 3 % and 57 % of the light.
 MEASURED = {"soft": "blender_courtyard.exr", "medium": "blender_studio.exr", "hard sun": "blender_sunrise.exr"}
@@ -44,9 +43,12 @@ def procedural_sky(height: int, sun: float) -> np.ndarray:
     radiance."""
     polar = (np.arange(height) + 0.5) / height * np.pi
     azimuth = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    d = np.stack(np.broadcast_arrays(
-        np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
-    ), axis=-1)  # fmt: skip
+    d = np.stack(
+        np.broadcast_arrays(
+            np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
+        ),
+        axis=-1,
+    )
     up = d[..., 2:]
     sky = np.where(up > 0, [0.4, 0.6, 1.0] * (0.5 + up), np.array([0.3, 0.25, 0.2]) * (1 + 0.5 * up))
     for axis, width, level in (([1, 0, 0.3], 0.25, 6.0), ([-0.5, -0.8, 0.4], 0.15, 12.0)):

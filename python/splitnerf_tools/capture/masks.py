@@ -10,22 +10,22 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_header, to_uint8
 from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.data.masks import read_mask
-from splitnerf.data.pixels import decoded
 from splitnerf.data.normalisation import transform_points
+from splitnerf.data.pixels import decoded
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.notes import note
+
 from splitnerf_tools.capture.photographs import Photograph
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
-from splitnerf_tools.separation.separate import find_object, table_under
-from splitnerf_tools.separation.masks import find_mask, surface_points
 from splitnerf_tools.separation.ground import Table
+from splitnerf_tools.separation.masks import find_mask, surface_points
+from splitnerf_tools.separation.separate import find_object, table_under
 from splitnerf_tools.separation.training import train_field
 
 STEPS = 5500  # of the field

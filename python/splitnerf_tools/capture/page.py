@@ -40,12 +40,19 @@ def write_page(
         ("exposures", f"{gains.min():.2f} to {gains.max():.2f}"),
     ]
     photos = [
-        {"name": name, "picture": _masked(out, name), "exposure": f"{gain:.2f}"} for name, gain in zip(scene.names, gains)
+        {"name": name, "picture": _masked(out, name), "exposure": f"{gain:.2f}"}
+        for name, gain in zip(scene.names, gains)
     ]
     write_html(
-        out / "prepare.html", "splitnerf_tools.capture", "prepare.html.j2",
-        title=title, tiles=tiles, plans=_plans(world), left_out=sorted(left_out.items()), photos=photos,
-    )  # fmt: skip
+        out / "prepare.html",
+        "splitnerf_tools.capture",
+        "prepare.html.j2",
+        title=title,
+        tiles=tiles,
+        plans=_plans(world),
+        left_out=sorted(left_out.items()),
+        photos=photos,
+    )
 
 
 def _masked(out: Path, name: str) -> Markup:

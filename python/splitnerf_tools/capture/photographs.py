@@ -11,7 +11,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
-
 from splitnerf.data.images import from_profile
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
@@ -56,11 +55,14 @@ def find_photographs(folder: Path) -> list[Photograph]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give the folder with the photos")
     paths = sorted(
-        path for path in folder.iterdir()
+        path
+        for path in folder.iterdir()
         if path.suffix.lower() in COMMON + HEIC + RAW and path.is_file() and not path.name.startswith("._")  # a Mac's
     )
     if not paths:
-        raise InputError(f"{folder}: holds no photos ({', '.join(COMMON + HEIC + RAW)}); give the folder with the photos")
+        raise InputError(
+            f"{folder}: holds no photos ({', '.join(COMMON + HEIC + RAW)}); give the folder with the photos"
+        )
     seen: dict[str, Path] = {}
     for path in paths:
         seen.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
@@ -152,7 +154,9 @@ def _open(path: Path) -> Image.Image:
         try:
             import pillow_heif
         except ImportError:
-            raise InputError(f"{path}: HEIC photos need the package pillow-heif; pip install 'splitnerf[heic]'") from None
+            raise InputError(
+                f"{path}: HEIC photos need the package pillow-heif; pip install 'splitnerf[heic]'"
+            ) from None
         pillow_heif.register_heif_opener()
     try:
         image = Image.open(path)

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-
 from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.errors import InputError
+
 from splitnerf_tools.capture.photographs import Photograph
 
 LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
@@ -23,7 +23,10 @@ OVERLAP = 15  # neighbours in the order of names with which a photo is matched b
 MIN_PHOTOS = 3
 FEW = 10  # photos up to which points that two of them show are kept
 ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
-MAX_ERROR, SHORTEST = 2.0, 3  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
+MAX_ERROR, SHORTEST = (
+    2.0,
+    3,
+)  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
@@ -117,9 +120,12 @@ def reconstruct(
     with _quiet():
         with _counted(database, "keypoints", n, lambda share: report("features", share)):
             pycolmap.extract_features(
-                database, images, camera_mode=pycolmap.CameraMode.PER_FOLDER, reader_options=reader,
+                database,
+                images,
+                camera_mode=pycolmap.CameraMode.PER_FOLDER,
+                reader_options=reader,
                 extraction_options=extraction,
-            )  # fmt: skip
+            )
         if n <= EXHAUSTIVE:
             with _counted(database, "two_view_geometries", n * (n - 1) // 2, lambda share: report("matches", share)):
                 pycolmap.match_exhaustive(database)
@@ -188,10 +194,16 @@ def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
             point = image.points2D[index]
             photo_of.append(i), point_of.append(numbers[point.point3D_id]), observed.append(point.xy)
     return Reconstruction(
-        [Path(image.name).stem for image in images], np.array(poses), lenses,
-        np.array([model.points3D[key].xyz for key in sorted(model.points3D)]), np.array(photo_of), np.array(point_of),
-        np.array(observed), float(model.compute_mean_reprojection_error()), n_models,
-    )  # fmt: skip
+        [Path(image.name).stem for image in images],
+        np.array(poses),
+        lenses,
+        np.array([model.points3D[key].xyz for key in sorted(model.points3D)]),
+        np.array(photo_of),
+        np.array(point_of),
+        np.array(observed),
+        float(model.compute_mean_reprojection_error()),
+        n_models,
+    )
 
 
 @contextmanager
@@ -207,7 +219,9 @@ def _quiet() -> Iterator[None]:
 
 
 @contextmanager
-def _counted(database: Path, table: str, total: int, report: Callable[[float], None], every: float = 1.0) -> Iterator[None]:
+def _counted(
+    database: Path, table: str, total: int, report: Callable[[float], None], every: float = 1.0
+) -> Iterator[None]:
     """Reports the share of a table's rows while a step of COLMAP fills it."""
     done = threading.Event()
 

@@ -12,19 +12,26 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PIL import Image
-
 from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, locked, remove_partial
 from splitnerf.notes import note
-from splitnerf_tools.capture.photometry import Exposures, find_exposures
+
 from splitnerf_tools.capture.masks import find_masks, given_masks, mask_files
 from splitnerf_tools.capture.page import write_page
 from splitnerf_tools.capture.photographs import (
-    VIDEO, Photograph, find_photographs, is_upright, read_upright, sharpness, write_frames, write_png,
-)  # fmt: skip
+    VIDEO,
+    Photograph,
+    find_photographs,
+    is_upright,
+    read_upright,
+    sharpness,
+    write_frames,
+    write_png,
+)
+from splitnerf_tools.capture.photometry import Exposures, find_exposures
 from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
 from splitnerf_tools.capture.surroundings import Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -79,7 +86,11 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         InputError: The photos cannot be read or do not fit together, or the folder holds other files.
     """
     work = out / "work"
-    if out.is_dir() and {path.name for path in out.iterdir()} - {LOCK} and not (work.is_dir() or (out / "frames").is_dir()):
+    if (
+        out.is_dir()
+        and {path.name for path in out.iterdir()} - {LOCK}
+        and not (work.is_dir() or (out / "frames").is_dir())
+    ):
         raise InputError(f"{out}: holds other files; give a new folder")
     with locked(out):
         photos = _photographs(source, out, settings, report)
@@ -119,7 +130,9 @@ def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> N
         temporary.write_text(print_of_photos)
 
 
-def _sorted_out(photos: list[Photograph], report: Callable[[str, float], None]) -> tuple[list[Photograph], dict[str, str]]:
+def _sorted_out(
+    photos: list[Photograph], report: Callable[[str, float], None]
+) -> tuple[list[Photograph], dict[str, str]]:
     """The photos that are neither blurred nor dark, and why the others are left out."""
     sharp, bright = np.zeros(len(photos)), np.zeros(len(photos))
     for i, photo in enumerate(photos):
@@ -169,13 +182,17 @@ def _without_camera(photos: list[Photograph], placed: list[str], source: Path) -
     return dict.fromkeys(lost, "its camera was not found: too little in common with the others")
 
 
-def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: Callable[[str, float], None]) -> Exposures:
+def exposures_of(
+    scene: Reconstruction, by_name: dict[str, Photograph], report: Callable[[str, float], None]
+) -> Exposures:
     """The exposures by the photos' values at the points that they show."""
     values, radii = np.zeros(len(scene.photo_of)), np.zeros(len(scene.photo_of))
     for i, name in enumerate(scene.names):
         lens, here = scene.lenses[i], scene.photo_of == i
         pixels = read_upright(by_name[name].path)
-        luminance = srgb_to_linear(pixels / np.float32(np.iinfo(pixels.dtype).max)) @ np.float32([0.2126, 0.7152, 0.0722])
+        luminance = srgb_to_linear(pixels / np.float32(np.iinfo(pixels.dtype).max)) @ np.float32(
+            [0.2126, 0.7152, 0.0722]
+        )
         padded = np.pad(luminance, 1, mode="edge")
         smooth = sum(padded[a : a + lens.height, b : b + lens.width] for a in range(3) for b in range(3)) / 9
         x, y = scene.observed[here].astype(int).T
@@ -188,9 +205,14 @@ def exposures_of(scene: Reconstruction, by_name: dict[str, Photograph], report: 
 
 
 def write_data(
-    world: World, exposures: Exposures, by_name: dict[str, Photograph], mask_of: dict[str, Path] | None, out: Path,
-    settings: PrepareSettings, report: Callable[[str, float], None],
-) -> np.ndarray:  # fmt: skip
+    world: World,
+    exposures: Exposures,
+    by_name: dict[str, Photograph],
+    mask_of: dict[str, Path] | None,
+    out: Path,
+    settings: PrepareSettings,
+    report: Callable[[str, float], None],
+) -> np.ndarray:
     """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
     for folder in ("images", "masks"):
@@ -237,10 +259,19 @@ def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], 
     frames = []
     for i, (name, pinhole) in enumerate(zip(world.scene.names, pinholes)):
         mask = {"mask_path": f"masks/{name}.png"} if masked else {}
-        frames.append({
-            "file_path": f"images/{name}.png", **mask, "w": pinhole.width, "h": pinhole.height,
-            "fl_x": pinhole.fx, "fl_y": pinhole.fy, "cx": pinhole.cx, "cy": pinhole.cy,
-            "exposure": float(exposures.gains[i]), "transform_matrix": world.scene.poses[i].tolist(),
-        })  # fmt: skip
+        frames.append(
+            {
+                "file_path": f"images/{name}.png",
+                **mask,
+                "w": pinhole.width,
+                "h": pinhole.height,
+                "fl_x": pinhole.fx,
+                "fl_y": pinhole.fy,
+                "cx": pinhole.cx,
+                "cy": pinhole.cy,
+                "exposure": float(exposures.gains[i]),
+                "transform_matrix": world.scene.poses[i].tolist(),
+            }
+        )
     content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}
     write_json(out / TRANSFORMS, content)

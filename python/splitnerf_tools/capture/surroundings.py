@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_dilation
-
 from splitnerf.data.environment import texels_of_directions
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.data.layouts.frame import OPENCV_AXES
+
 from splitnerf_tools.capture.poses import Lens
 
 HEIGHT = 64  # rows of the map

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
+
 from splitnerf_tools.capture.poses import Lens
 
 HALF_PIXEL = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # OpenCV's pixel centres are whole numbers
@@ -36,7 +36,9 @@ def without_vignetting(photo: np.ndarray, lens: Lens, vignetting: tuple[float, f
     """
     y, x = np.mgrid[: lens.height, : lens.width] + 0.5
     squared = ((x - lens.cx) ** 2 + (y - lens.cy) ** 2) / (0.25 * (lens.width**2 + lens.height**2))
-    factor = np.maximum(1 + vignetting[0] * squared + vignetting[1] * squared**2, LEAST_LIGHT).astype(np.float32)[..., None]
+    factor = np.maximum(1 + vignetting[0] * squared + vignetting[1] * squared**2, LEAST_LIGHT).astype(np.float32)[
+        ..., None
+    ]
     white = np.iinfo(photo.dtype).max
     even = linear_to_srgb(srgb_to_linear(photo / np.float32(white)) / factor)
     even = np.where(photo == white, 1.0, even.clip(0, 1))

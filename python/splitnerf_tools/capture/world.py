@@ -9,8 +9,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from splitnerf_tools.separation.ground import TABLE_TOLERANCE, find_table
 from splitnerf_tools.capture.poses import Reconstruction
+from splitnerf_tools.separation.ground import TABLE_TOLERANCE, find_table
 
 CAMERA_DISTANCE = 3.0  # of the median camera from the centre, in the world's units
 NEARLY_ALL = 0.95  # share of the table's points within its radius

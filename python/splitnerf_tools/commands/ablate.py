@@ -14,11 +14,12 @@ from splitnerf.errors import InputError
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "ablate", help="measure what each part of the method is worth",
+        "ablate",
+        help="measure what each part of the method is worth",
         description="Trains on each DATA with the full method and with one part at a time taken out or exchanged, each for "
         "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to continue.",
         epilog=examples("splitnerf ablate data --minutes 6", "splitnerf ablate --list"),
-    )  # fmt: skip
+    )
     parser.add_argument("data", type=Path, nargs="*", metavar="DATA")
     parser.add_argument("--out", type=Path, default=Path("runs/ablation"), metavar="OUT", help="default: runs/ablation")
     parser.add_argument("--minutes", type=float, metavar="M", help="training time of each run (default: 6, or --steps)")
@@ -44,6 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import parse_setting, preset
+
     from splitnerf_tools.ablate.rows import PAPER, SWITCHES, make_rows
 
     if args.seeds != 1 and args.seeds < 3:
@@ -67,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
     from splitnerf.evaluate.jobs import Protocol
     from splitnerf.files import atomic_path, locked
+
     from splitnerf_tools.ablate.runs import AblationPlan, Interrupted, ablate
     from splitnerf_tools.ablate.scores import csv_table, markdown_table
 
@@ -79,7 +82,9 @@ def run(args: argparse.Namespace) -> int:
             with atomic_path(args.out / name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
-    plan = AblationPlan(list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out)
+    plan = AblationPlan(
+        list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out
+    )
     refuse_data(args.out)
     try:
         with locked(args.out):

@@ -30,7 +30,9 @@ def training_options() -> argparse.ArgumentParser:
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "batch", help="reconstruct many scenes, on this machine or on a cluster", parents=[training_options()],
+        "batch",
+        help="reconstruct many scenes, on this machine or on a cluster",
+        parents=[training_options()],
         description="Trains on each of SCENES in a process of its own, DIR/NAME for each, as many at once as the machines of Ray "
         "hold, and writes one table, DIR/batch.md and batch.json. Ctrl-C saves the state of all; the same command goes on. Needs "
         "pip install 'splitnerf[batch]'.",
@@ -38,24 +40,35 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf batch scenes/* --out runs/all --max-minutes 30",
             "splitnerf batch scenes/* --out runs/all --max-minutes 30 --address 10.0.0.1:6379",
         ),
-    )  # fmt: skip
+    )
     parser.add_argument("scenes", type=Path, nargs="+", metavar="SCENES", help="folders of posed images")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table"
+    )
     parser.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster to use (default: Ray is started here)")
-    parser.add_argument("--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes")
-    parser.add_argument("--gpus-per-scene", type=float, metavar="N", help="default: .25 where there are GPUs; preset paper: 1")
-    parser.add_argument("--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it")
-    parser.add_argument("--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)")
+    parser.add_argument(
+        "--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes"
+    )
+    parser.add_argument(
+        "--gpus-per-scene", type=float, metavar="N", help="default: .25 where there are GPUs; preset paper: 1"
+    )
+    parser.add_argument(
+        "--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it"
+    )
+    parser.add_argument(
+        "--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)"
+    )
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
     from splitnerf.files import locked
+
     from splitnerf_tools.batch.cluster import machines_of, ray_on, share_of
-    from splitnerf_tools.batch.tasks import BatchPlan, run_batch
-    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, known_scenes, requested_scenes, terminal_row
     from splitnerf_tools.batch.scenes import DONE as SCENE_DONE
+    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, known_scenes, requested_scenes, terminal_row
+    from splitnerf_tools.batch.tasks import BatchPlan, run_batch
 
     check_usage(args)
     refuse_data(args.out)
@@ -73,9 +86,14 @@ def run(args: argparse.Namespace) -> int:
         batch = BatchPlan(args.out, known, requested, given_options(args), args.retries, row, note)
         with ray_on(args.address, args.out) as ray:
             share = share_of(
-                machines_of(ray), len(requested), cores=args.cores_per_scene, gpus=args.gpus_per_scene,
-                memory=args.memory_per_scene, photos=args.max_memory, whole_gpu=args.preset == "paper",
-            )  # fmt: skip
+                machines_of(ray),
+                len(requested),
+                cores=args.cores_per_scene,
+                gpus=args.gpus_per_scene,
+                memory=args.memory_per_scene,
+                photos=args.max_memory,
+                whole_gpu=args.preset == "paper",
+            )
             note(f"{len(requested)} scenes, {share} each")
             print(terminal_row(), file=out, flush=True)
             all_ended = run_batch(ray, batch, share)

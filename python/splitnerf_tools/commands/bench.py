@@ -18,20 +18,29 @@ BENCHMARKS = {
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "bench", help="measure run time against error",
+        "bench",
+        help="measure run time against error",
         description="Checks the operators, times them and the peers that are installed (drjit, open3d, mitsuba), and writes for "
         "each benchmark a page, a CSV file and a picture. Measured maps and meshes are taken from the folder SPLITNERF_DATA, "
         "else procedural ones.",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "name", nargs="?", choices=tuple(BENCHMARKS), metavar="BENCHMARK",
+        "name",
+        nargs="?",
+        choices=tuple(BENCHMARKS),
+        metavar="BENCHMARK",
         help="; ".join(f"{name}: {what}" for name, what in BENCHMARKS.items()) + " (default: all)",
-    )  # fmt: skip
-    parser.add_argument("--quick", action="store_true", help="small inputs: a few minutes, to run before and after a change")
+    )
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", default=Path("docs/benchmarks") if Path("docs").is_dir() else Path(),
+        "--quick", action="store_true", help="small inputs: a few minutes, to run before and after a change"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        default=Path("docs/benchmarks") if Path("docs").is_dir() else Path(),
         help="folder of the files (default: docs/benchmarks in a checkout, else here)",
-    )  # fmt: skip
+    )
     parser.set_defaults(execute=run)
 
 

@@ -15,15 +15,18 @@ from splitnerf.errors import InputError
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "demo", help="render a small scene, reconstruct it and print the errors against its truth",
+        "demo",
+        help="render a small scene, reconstruct it and print the errors against its truth",
         description="Makes a scene with known shape, materials and sky, renders it with the built-in path tracer, "
         "trains on it and prints the errors. Nothing is downloaded.",
         epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out runs/short --overwrite"),
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
     )
-    parser.add_argument("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and refinement (default: 4)")
+    parser.add_argument(
+        "--max-minutes", type=float, default=4.0, metavar="M", help="time of training and refinement (default: 4)"
+    )
     parser.add_argument("--no-refine", action="store_true", help="no refinement: training gets all minutes")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
@@ -36,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.files import locked
     from splitnerf.pipeline import reconstruct
     from splitnerf.run_folder import check_run
+
     from splitnerf_tools.demo.scene import write_demo_dataset
 
     if not args.max_minutes > 0:

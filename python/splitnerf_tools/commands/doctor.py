@@ -8,6 +8,7 @@ from pathlib import Path
 
 import splitnerf
 from splitnerf.cli.exit_codes import DONE, FAILED
+
 from splitnerf_tools.findings import show
 
 INSTALL_AGAIN = "install it again: pip install --force-reinstall --no-deps --no-build-isolation ."
@@ -15,11 +16,12 @@ INSTALL_AGAIN = "install it again: pip install --force-reinstall --no-deps --no-
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "doctor", help="look at the machine and the installation, and test every operator",
+        "doctor",
+        help="look at the machine and the installation, and test every operator",
         description="Prints versions, threads, instruction set, GPU, ray tracer, memory, disk and optional packages, "
         "tests every operator against what is known without it, and says what to do about each finding. Exit code 1: "
         "something failed.",
-    )  # fmt: skip
+    )
     parser.set_defaults(execute=run)
 
 

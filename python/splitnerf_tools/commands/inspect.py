@@ -15,17 +15,21 @@ PAGE = "inspect.html"
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "inspect", help="look at data before training: cameras, masks, exposures, and what may be wrong",
+        "inspect",
+        help="look at data before training: cameras, masks, exposures, and what may be wrong",
         description="Prints what DATA hold and what to do about what is suspected: cameras in the object or on one "
         "side of it, masks that disagree with the poses, a moved object, duplicate photos, differing brightness, cut, "
         "small or clipped objects. Draws it, with all masks over their photos, on a page. Exit code 2: DATA cannot be read.",
         epilog=examples("splitnerf inspect data", "splitnerf inspect data --out looks.html"),
-    )  # fmt: skip
+    )
     parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images")
     parser.add_argument(
-        "--out", type=Path, default=Path(PAGE), metavar="PAGE",
+        "--out",
+        type=Path,
+        default=Path(PAGE),
+        metavar="PAGE",
         help=f"the page to write, or a folder for it (default: {PAGE})",
-    )  # fmt: skip
+    )
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     add_reading_options(parser, "as the data say")
     parser.set_defaults(execute=run)
@@ -33,6 +37,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.pipeline import load_splits
+
     from splitnerf_tools.inspection.checks import inspect
     from splitnerf_tools.inspection.inspect_page import write_page
 

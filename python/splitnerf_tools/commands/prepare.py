@@ -13,14 +13,23 @@ from splitnerf.errors import InputError
 PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}
 
 # What a step takes of the whole time, roughly; masks: where they are to be found, and where they are given.
-STEPS = {"frames": 0.02, "photos": 0.01, "features": 0.08, "matches": 0.06, "cameras": 0.1, "exposures": 0.02,
-         "images": 0.02, "masks": 0.69}  # fmt: skip
+STEPS = {
+    "frames": 0.02,
+    "photos": 0.01,
+    "features": 0.08,
+    "matches": 0.06,
+    "cameras": 0.1,
+    "exposures": 0.02,
+    "images": 0.02,
+    "masks": 0.69,
+}
 GIVEN_MASKS = 0.02
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "prepare", help="find cameras, masks and exposures of photographs",
+        "prepare",
+        help="find cameras, masks and exposures of photographs",
         description="Reads a folder of photographs, or a video, of one object that does not move, and writes DATA, which train "
         "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command continues "
         "where it was interrupted.",
@@ -29,14 +38,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf prepare turn.mp4 --frames 150 --out data",
             "splitnerf prepare photos --masks masks --max-size 1600 --out data",
         ),
-    )  # fmt: skip
+    )
     parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
     parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")
     parser.add_argument("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
     parser.add_argument(
-        "--max-size", type=int, default=0, metavar="N",
+        "--max-size",
+        type=int,
+        default=0,
+        metavar="N",
         help="longest edge of the written images in pixels (default: the photos')",
-    )  # fmt: skip
+    )
     parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
     parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
     parser.set_defaults(execute=run)
@@ -47,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     from splitnerf.progress import Progress, ended_by_signals
+
     from splitnerf_tools.capture.prepare import PrepareSettings, prepare
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)

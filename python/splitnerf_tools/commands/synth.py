@@ -17,7 +17,8 @@ MATERIALS = ("matte", "glossy", "metal")
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "synth", help="render a dataset with full truth from a GLB file or a built-in shape",
+        "synth",
+        help="render a dataset with full truth from a GLB file or a built-in shape",
         description="Renders ASSET or a built-in shape, brought to the unit sphere, from cameras around it under the light MAP, "
         "with true albedo, roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
         epilog=examples(
@@ -25,11 +26,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",
             "splitnerf synth --shape mug --material glossy --light studio.hdr --out data",
         ),
-    )  # fmt: skip
+    )
     rendered = parser.add_mutually_exclusive_group(required=True)
     rendered.add_argument("asset", type=Path, nargs="?", metavar="ASSET.glb")
     rendered.add_argument(
-        "--shape", choices=SHAPES, metavar="NAME", help=f"a built-in shape, hollow, pierced or touching: {', '.join(SHAPES)}"
+        "--shape",
+        choices=SHAPES,
+        metavar="NAME",
+        help=f"a built-in shape, hollow, pierced or touching: {', '.join(SHAPES)}",
     )
     parser.add_argument("--material", choices=MATERIALS, help="of the shape, under a painted pattern (default: matte)")
     parser.add_argument(
@@ -45,16 +49,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
     parser.add_argument(
         "--layout",
-        choices=LAYOUTS, metavar="SET", default="blender",
+        choices=LAYOUTS,
+        metavar="SET",
+        default="blender",
         help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
         "only these and stanford-orb take --relight",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.export.glb import write_glb
+
     from splitnerf_tools.synth.rendering import SynthSettings, synthesise
     from splitnerf_tools.synth.shapes import shape_asset
 

@@ -17,21 +17,27 @@ LOCAL = "127.0.0.1"
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
-        "view", help="look at an asset in the browser",
+        "view",
+        help="look at an asset in the browser",
         description="Serves a page that shows RUN's mesh.glb, or a GLB file, in the light that the run recovered, and its "
         "maps. Other lights (.hdr, .exr) can be dropped onto the page. Ctrl-C ends it.",
         epilog=examples("splitnerf view runs/data --data data", "splitnerf view runs/a runs/b --light studio.hdr"),
-    )  # fmt: skip
-    # fmt: off
+    )
     add = parser.add_argument
     add("source", type=Path, metavar="RUN|FILE.glb", help="a run's folder or a .glb")
-    add("other", type=Path, nargs="?", metavar="OTHER", help="a second one, shown beside the first with the same camera")
+    add(
+        "other", type=Path, nargs="?", metavar="OTHER", help="a second one, shown beside the first with the same camera"
+    )
     add("--light", type=Path, metavar="MAP", help="equirectangular .exr or .hdr that is shown first")
     add("--data", type=Path, metavar="DATA", help="the data that RUN was trained on: shows their cameras and photos")
     add("--port", type=int, default=0, metavar="N", help="of the page's address (default: a free one)")
-    add("--host", default=LOCAL, metavar="H", help=f"the address to listen at; another than {LOCAL} lets other machines in")
+    add(
+        "--host",
+        default=LOCAL,
+        metavar="H",
+        help=f"the address to listen at; another than {LOCAL} lets other machines in",
+    )
     add("--no-browser", action="store_true", help="print the address only")
-    # fmt: on
     parser.set_defaults(execute=run)
 
 

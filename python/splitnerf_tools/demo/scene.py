@@ -153,10 +153,23 @@ def write_demo_dataset(
     for split, n in (("train", n_train), ("test", n_test)):
         for i, pose in enumerate(camera_poses(n, split=split)):
             images = _core.render(
-                scene, demo.albedo, demo.roughness, demo.metallic, environment, pose[:3].astype(np.float32),
-                focal, focal, size / 2, size / 2, size, size,
-                normals=demo.normals, spp=spp, clamp_indirect=1.0, seed=(seed * 2 + (split == "test")) * 65536 + i,
-            )  # fmt: skip
+                scene,
+                demo.albedo,
+                demo.roughness,
+                demo.metallic,
+                environment,
+                pose[:3].astype(np.float32),
+                focal,
+                focal,
+                size / 2,
+                size / 2,
+                size,
+                size,
+                normals=demo.normals,
+                spp=spp,
+                clamp_indirect=1.0,
+                seed=(seed * 2 + (split == "test")) * 65536 + i,
+            )
             writer.view(split, i, pose, images)
     writer.mesh(demo.vertices, demo.triangles)
     writer.close()
@@ -194,7 +207,11 @@ def _plinth(*, radius: float, height: float, bevel: float) -> Shape:
 def _bowl(*, outer: float, inner: float) -> Shape:
     """Half a hollow ball below the origin, with a round rim."""
     wall = 0.5 * (outer - inner)
-    below, rim, within = (0.0, 0.0, outer, -np.pi / 2, 0.0), (outer - wall, 0.0, wall, 0.0, np.pi), (0.0, 0.0, inner, 0.0, -np.pi / 2)
+    below, rim, within = (
+        (0.0, 0.0, outer, -np.pi / 2, 0.0),
+        (outer - wall, 0.0, wall, 0.0, np.pi),
+        (0.0, 0.0, inner, 0.0, -np.pi / 2),
+    )
     inside = [(r, z, -normal_r, -normal_z) for r, z, normal_r, normal_z in _arc(*within, n=96)]
     return _revolved(_arc(*below, n=96) + _arc(*rim, n=24) + inside)
 

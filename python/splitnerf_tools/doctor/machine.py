@@ -9,13 +9,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-import torch
-
 import splitnerf
+import torch
 from splitnerf import _core
 from splitnerf.devices import devices, refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.memory import SHARE_OF_PHOTOS, control_group, memory_bytes
+
 from splitnerf_tools.findings import Finding
 
 INSTALL = "pip install --no-build-isolation ."
@@ -50,9 +50,17 @@ def findings(folder: Path) -> list[Finding]:
     """All findings; ``folder`` is where the runs will be written."""
     system = f"{platform.python_version()}, {platform.system()} {platform.machine()}"
     return [
-        Finding("splitnerf", splitnerf.__version__), Finding("Python", system), threads(), kernels(), cuda(),
-        ray_tracing(), texture_coordinates(), memory(), disk(folder), *map(optional, PACKAGES),
-    ]  # fmt: skip
+        Finding("splitnerf", splitnerf.__version__),
+        Finding("Python", system),
+        threads(),
+        kernels(),
+        cuda(),
+        ray_tracing(),
+        texture_coordinates(),
+        memory(),
+        disk(folder),
+        *map(optional, PACKAGES),
+    ]
 
 
 def threads() -> Finding:

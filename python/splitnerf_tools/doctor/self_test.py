@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import torch
+from splitnerf.ops._library import lib
 from torch import Tensor
 from torch.utils._pytree import tree_flatten, tree_leaves, tree_map
 
-from splitnerf.ops._library import lib
 from splitnerf_tools.doctor.cases import DIFFERENTIABLE, OWN, pattern, usual
 
 TOLERANCE = 5e-5  # share of the sum of absolute values
@@ -61,8 +61,11 @@ def failures(device: str, names: Iterable[str] | None = None) -> list[Failure]:
     for name in operators(device) if names is None else names:
         try:
             found, result = dict(results(name, device)), ""
-            wrong = [(result, f"found {found[result][0]:.6g}, expected {known[0]:.6g}")
-                     for result, known in answers()[name].items() if is_off(name, found[result], known)]  # fmt: skip
+            wrong = [
+                (result, f"found {found[result][0]:.6g}, expected {known[0]:.6g}")
+                for result, known in answers()[name].items()
+                if is_off(name, found[result], known)
+            ]
         except Exception as error:  # whatever it is, it is reported, and the other operators are asked
             wrong = [("", f"raised {type(error).__name__}: {' '.join(str(error).split())[:200]}")]
         if wrong:
@@ -123,7 +126,9 @@ def sums(x: Tensor) -> list[float]:
 
 def write_answers(path: Path) -> None:
     """Asks all operators in float64, where they have it, and keeps what they give."""
-    names = {name.removeprefix("splitnerf::") for name in torch._C._dispatch_get_all_op_names() if "splitnerf::" in name}
+    names = {
+        name.removeprefix("splitnerf::") for name in torch._C._dispatch_get_all_op_names() if "splitnerf::" in name
+    }
     lines = []
     for name in sorted(name for name in names if "_backward" not in name):
         found = results(name, "cpu", torch.float32 if name in CPU_ALONE else torch.float64)

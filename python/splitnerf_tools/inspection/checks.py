@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.frames import layout_of, split_rule
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
+
 from splitnerf_tools.findings import Finding
 from splitnerf_tools.inspection.directions import angles, largest_gap
 from splitnerf_tools.inspection.hull import Fit, fit_masks
@@ -121,7 +121,9 @@ def _upward(upward: np.ndarray) -> Finding:
 
 def _inside(views: Sequence[ReducedView], fit: Fit) -> Finding:
     suspects = dict.fromkeys(fit.inside, "camera in the object")
-    return _suspicion("cameras in the object", f"{len(suspects) or 'none'}", "check their poses, or leave them out", views, suspects)
+    return _suspicion(
+        "cameras in the object", f"{len(suspects) or 'none'}", "check their poses, or leave them out", views, suspects
+    )
 
 
 def _shares(views: Sequence[ReducedView]) -> Finding:

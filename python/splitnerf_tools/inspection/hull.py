@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
-
 from splitnerf.data.normalisation import MaskView, cell_centres
+
 from splitnerf_tools.inspection.reduced_views import ReducedView
 
 REACH = 3.0  # half edge of the box that is searched, in the internal frame, where the object's radius is about 1
@@ -127,7 +127,9 @@ class _Votes:
         if len(depth) == 0:
             return filled
         filled[y, x] = True
-        footprint = 2 * round(view.intrinsics[0] * self.cell / float(np.median(depth)) / 2) + 1  # odd, about a cell's width
+        footprint = (
+            2 * round(view.intrinsics[0] * self.cell / float(np.median(depth)) / 2) + 1
+        )  # odd, about a cell's width
         return ndimage.binary_dilation(filled, np.ones((footprint, footprint))) & view.known
 
     def agreement(self, members: np.ndarray, share: float) -> np.ndarray:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 from scipy import ndimage
-
 from splitnerf.data.dataset import spread
-from splitnerf_tools.inspection.directions import horizontal_axes
+
 from splitnerf_tools.inspection.checks import Inspection
+from splitnerf_tools.inspection.directions import horizontal_axes
 from splitnerf_tools.report.drawings import line_chart, plan
 from splitnerf_tools.report.embedding import photo_uri, write_html
 
@@ -36,11 +36,16 @@ def write_page(path: Path, found: Inspection) -> None:
         for index, view in enumerate(found.views)
     ]
     write_html(
-        path, "splitnerf_tools.inspection", "inspect.html.j2",
-        title=found.title, findings=found.findings, plans=_plans(found, kinds), charts=_charts(found),
+        path,
+        "splitnerf_tools.inspection",
+        "inspect.html.j2",
+        title=found.title,
+        findings=found.findings,
+        plans=_plans(found, kinds),
+        charts=_charts(found),
         photos=[_photo(found, index, suspects.get(index, [])) for index in [*first, *others]],
         left_out=len(found.views) - len(first) - len(others),
-    )  # fmt: skip
+    )
 
 
 def _plans(found: Inspection, kinds: list[str]) -> list[Markup]:

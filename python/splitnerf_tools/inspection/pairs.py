@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
-
 from splitnerf.data.images import srgb_to_linear
+
 from splitnerf_tools.inspection.hull import Fit
 from splitnerf_tools.inspection.reduced_views import ReducedView
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import area_average, linear_to_srgb
 
@@ -52,7 +51,6 @@ class ReducedView:
     def place(self) -> np.ndarray:
         """[3] the camera's position."""
         return self.pose[:3, 3]
-
 
     def shown(self, points: np.ndarray, nearest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The points [m, 3] that lie within the photo and farther away than `nearest`: their numbers [k], the rows and columns

@@ -11,8 +11,19 @@ from markupsafe import Markup, escape
 WIDTH, HEIGHT = 460, 250
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 34
 PALETTE = (
-    "#3b82c4", "#d9822b", "#3f9d63", "#b5539a", "#8a7ad1", "#c2524a", "#2c9c9c", "#98863a", "#8d9298", "#6aa84f", "#d46a9f", "#5c6bc0",
-)  # fmt: skip
+    "#3b82c4",
+    "#d9822b",
+    "#3f9d63",
+    "#b5539a",
+    "#8a7ad1",
+    "#c2524a",
+    "#2c9c9c",
+    "#98863a",
+    "#8d9298",
+    "#6aa84f",
+    "#d46a9f",
+    "#5c6bc0",
+)
 MAX_POINTS = 400
 SIDE = 400  # of a plan, in its own units
 AHEAD = 0.04  # length of the line that shows where a camera looks, in the plan's edge
@@ -94,8 +105,12 @@ def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -
         return None
     stride = math.ceil(len(xs) / MAX_POINTS)
     groups = [xs[i : min(i + stride, len(xs) - 1)] for i in range(0, len(xs) - 1, stride)] + [xs[-1:]]
-    found = {name: [[points[x] for x in group if x in points] for group in groups] for name, points in kept.items() if points}
-    lines = [{"name": name, "values": [_mean(values) if values else None for values in rows]} for name, rows in found.items()]
+    found = {
+        name: [[points[x] for x in group if x in points] for group in groups] for name, points in kept.items() if points
+    }
+    lines = [
+        {"name": name, "values": [_mean(values) if values else None for values in rows]} for name, rows in found.items()
+    ]
     return {"title": title, "log": log, "x": [_mean(group) for group in groups], "series": lines}
 
 

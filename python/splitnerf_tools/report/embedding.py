@@ -15,7 +15,6 @@ import numpy as np
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 from PIL import Image, features
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.images import encode_png, linear_to_srgb, to_uint8
 from splitnerf.files import atomic_path
@@ -72,7 +71,12 @@ def camera_of(asset: Asset) -> dict:
     """The camera that a page starts with, that of `splitnerf relight`; lengths are the data's, z is up."""
     centre, radius = bounding_sphere(asset)
     front = turntable(asset, 1, size=None)[0]
-    return {"position": front.pose[:3, 3].tolist(), "target": centre.tolist(), "radius": radius, "half_field": float(HALF_FIELD)}
+    return {
+        "position": front.pose[:3, 3].tolist(),
+        "target": centre.tolist(),
+        "radius": radius,
+        "half_field": float(HALF_FIELD),
+    }
 
 
 def _finite(content: object) -> object:
@@ -91,7 +95,9 @@ def data_uri(pixels: np.ndarray) -> Markup:
     if pixels.shape[0] * pixels.shape[1] <= SMALL or not features.check("webp"):
         return _uri("png", encode_png(pixels))
     codes, file = to_uint8(pixels), io.BytesIO()
-    Image.fromarray(codes[..., 0] if codes.shape[2] == 1 else codes).save(file, "WEBP", lossless=True, quality=WEBP_EFFORT, method=1)
+    Image.fromarray(codes[..., 0] if codes.shape[2] == 1 else codes).save(
+        file, "WEBP", lossless=True, quality=WEBP_EFFORT, method=1
+    )
     return _uri("webp", file.getvalue())
 
 

@@ -13,7 +13,13 @@ from markupsafe import Markup
 
 from splitnerf_tools.report.drawings import PALETTE, curve_data, line_chart
 from splitnerf_tools.report.embedding import script_json, write_html
-from splitnerf_tools.report.sections import asset_section, embedded_light, panels_section, refinement_section, views_section
+from splitnerf_tools.report.sections import (
+    asset_section,
+    embedded_light,
+    panels_section,
+    refinement_section,
+    views_section,
+)
 
 
 def write_report(

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
 from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background
 from splitnerf.data.truth import load_scene_truth
-from splitnerf.pipeline import REPORT_VIEWS
-from splitnerf.run_folder import ASSET_FILES, is_refined
 from splitnerf.evaluate.asset import asset_predictions
 from splitnerf.evaluate.jobs import Evaluated
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import fibonacci_directions, prefilter_light
+from splitnerf.pipeline import REPORT_VIEWS
 from splitnerf.refinement.job import TRAINED
 from splitnerf.render.model import SceneModel
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.run_folder import ASSET_FILES, is_refined
 from splitnerf.training.metrics import METRICS, read_metrics
+
 from splitnerf_tools.report.html import write_report
 
 ROUGHNESS = (0.0, 0.25, 0.5, 1.0)  # of the light's panels
@@ -45,7 +45,11 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
     write_report(
         run / "report.html",
         title=f"{run.resolve().name} · {views.name}",
-        summary={"Result": headline(evaluated.scores), "All scores": evaluated.scores, "Settings": asdict(model.config)},
+        summary={
+            "Result": headline(evaluated.scores),
+            "All scores": evaluated.scores,
+            "Settings": asdict(model.config),
+        },
         views=pages,
         refinement=refinement_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
         lights=light_panels(model),

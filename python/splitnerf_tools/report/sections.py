@@ -13,14 +13,22 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 from PIL import Image
-
 from splitnerf.data.environment import resize_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.gltf.document import Document
 from splitnerf.data.images import area_average, linear_to_srgb, over_background
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
-from splitnerf_tools.report.embedding import WHITE_PER_MEAN, as_halves, camera_of, data_uri, packed, tonemapped, white_of
+
+from splitnerf_tools.report.embedding import (
+    WHITE_PER_MEAN,
+    as_halves,
+    camera_of,
+    data_uri,
+    packed,
+    tonemapped,
+    white_of,
+)
 
 MOST_BYTES = 4 << 20  # of a GLB within a page
 TEXTURE_SIDES = (2048, 1024, 512, 256)  # pixels that are tried, one after the other
@@ -121,12 +129,18 @@ def views_section(views: Sequence[Mapping], albedo_scale: Sequence[float] | None
         views: See :func:`splitnerf_tools.report.write_report`.
         albedo_scale: The factor [3] of the predicted albedo under which it is scored, and shown here; None for 1.
     """
-    maps = [key for key in MAPS if any(view[side].get(key) is not None for view in views for side in ("truth", "prediction"))]
+    maps = [
+        key
+        for key in MAPS
+        if any(view[side].get(key) is not None for view in views for side in ("truth", "prediction"))
+    ]
     return {
         "maps": [MAPS[key] for key in maps],
         "pairs": [comparison(f"truth {key}", key, KINDS.get(key, "number")) | {"name": MAPS[key]} for key in maps],
         "sides": ["truth", "SplitNeRF"],
-        "views": [_view(view, maps, np.ones(3) if albedo_scale is None else np.asarray(albedo_scale)) for view in views],
+        "views": [
+            _view(view, maps, np.ones(3) if albedo_scale is None else np.asarray(albedo_scale)) for view in views
+        ],
         "scale": None if albedo_scale is None else ", ".join(f"{factor:.3g}" for factor in albedo_scale),
     }
 
@@ -141,7 +155,11 @@ def _view(view: Mapping, keys: Sequence[str], scale: np.ndarray) -> dict:
     if "albedo" in prediction:
         prediction["albedo"] = prediction["albedo"] * scale
     rows = [
-        {"name": name, "cells": [_map_picture(maps, key) if key in maps else None for key in keys], "keys": [f"{prefix}{k}" for k in keys]}
+        {
+            "name": name,
+            "cells": [_map_picture(maps, key) if key in maps else None for key in keys],
+            "keys": [f"{prefix}{k}" for k in keys],
+        }
         for name, prefix, maps in (("truth", "truth ", truth), ("SplitNeRF", "", prediction))
     ]
     return {"name": view["name"], "score": score, "rows": rows}
@@ -191,14 +209,20 @@ def refinement_section(page: Mapping) -> dict:
     coverage = np.mean([view["coverage"] for view in views], axis=0)
     rows.append(("these views: coverage, mean squared error", *(f"{value:.2g}" for value in coverage)))
     if summary["outline_error"]:
-        rows.append(("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"])))
+        rows.append(
+            ("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"]))
+        )
     name = "all photos: colours inside the outline, PSNR before the first step and before the last one"
     rows.append((name, *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
     return {
         "pictures": PICTURES,
         "pairs": [comparison(*pair, "colour") | {"name": " | ".join(pair), "sides": pair} for pair in PAIRS],
         "views": [
-            {"name": view["name"], "score": "{:.2f} → {:.2f} dB".format(*score), "cells": [data_uri(averaged(p)[0]) for p in view["pictures"]]}
+            {
+                "name": view["name"],
+                "score": "{:.2f} → {:.2f} dB".format(*score),
+                "cells": [data_uri(averaged(p)[0]) for p in view["pictures"]],
+            }
             for view, score in zip(views, scores)
         ],
         "rows": rows,
@@ -215,8 +239,13 @@ def embedded_light(name: str, radiance: np.ndarray) -> dict:
     width, height, content = as_halves(small)
     white = white_of(radiance)
     return {
-        "name": name, "white": white, "picture": tonemapped(small, white), "width": width, "height": height, "packed": packed(content),
-    }  # fmt: skip
+        "name": name,
+        "white": white,
+        "picture": tonemapped(small, white),
+        "width": width,
+        "height": height,
+        "packed": packed(content),
+    }
 
 
 def panels_section(panels: Sequence[Mapping]) -> dict | None:

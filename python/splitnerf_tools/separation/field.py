@@ -7,11 +7,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
-from torch import Tensor, nn
-from torch.nn import functional as F
-
 from splitnerf.ops import HashGrid, HashGridSpec
 from splitnerf.ops.hash_grid import growth_for
+from torch import Tensor, nn
+from torch.nn import functional as F
 
 FINE = dict(n_levels=10, n_features=2, base_resolution=16, log2_table_size=17), 640  # the finest level's cells
 COARSE = dict(n_levels=5, n_features=2, base_resolution=16, log2_table_size=15), 160
@@ -75,9 +74,14 @@ class RadianceField(nn.Module):
         )
 
     def render(
-        self, rays_o: Tensor, rays_d: Tensor, n_first: int, n: int, jitter: bool = False,
+        self,
+        rays_o: Tensor,
+        rays_d: Tensor,
+        n_first: int,
+        n: int,
+        jitter: bool = False,
         hidden: Callable[[Tensor], Tensor] | None = None,
-    ) -> Rendered:  # fmt: skip
+    ) -> Rendered:
         """Renders rays.
 
         Args:

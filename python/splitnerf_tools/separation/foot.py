@@ -26,7 +26,9 @@ NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
 SPARSE = 0.1  # smoothed weight of a cell below which nothing is known of it
 VAGUE = 0.03  # height over the table from which a point below an overhang is the object's, scene units
 GAP = 3  # cells that close holes in what stands over the foot
-HINT = 0.02  # what the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge
+HINT = (
+    0.02  # what the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge
+)
 UNDER = 10.0  # how much more it counts where the cell is high and the object is over it
 CONTRAST = 33.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
 
@@ -70,7 +72,9 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     medians, counts = _medians(index, heights, n)
     over = np.zeros(n * n, bool)
     over[_index(standing @ table.axes.T, n)] = True
-    over = ndimage.binary_closing(np.pad(over.reshape(n, n), GAP + 1), iterations=GAP)[GAP + 1 : -GAP - 1, GAP + 1 : -GAP - 1]
+    over = ndimage.binary_closing(np.pad(over.reshape(n, n), GAP + 1), iterations=GAP)[
+        GAP + 1 : -GAP - 1, GAP + 1 : -GAP - 1
+    ]
     colour = np.stack([_medians(index, channel, n)[0] for channel in colours.T], axis=-1)
     weights = np.minimum(counts, 1.0)
     around = np.stack([_smoothed(channel, weights) for channel in np.moveaxis(colour, -1, 0)], axis=-1)
@@ -79,7 +83,9 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     weights = _smoothed(weights, np.ones_like(weights))
     known = (weights > SPARSE) & ~hidden
     inside = random_walk(HINT * (MOST / n) ** 2 * _by_height(medians, counts, over), colour, known, CONTRAST) - 0.5
-    inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = 0.5  # no photo shows it: it is within the foot
+    inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = (
+        0.5  # no photo shows it: it is within the foot
+    )
     return Foot(table, inside, np.where(hidden, 1.0, -1.0).astype(np.float32))
 
 
@@ -95,7 +101,9 @@ def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.
     others = (weights > 0) & ~over
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
     least = max(LEAST_HEIGHT, NOISE * deviation)
-    heights = _smoothed(medians.clip(0.0, 2 * least), weights)  # the edge is half of the way up, however high the object is there
+    heights = _smoothed(
+        medians.clip(0.0, 2 * least), weights
+    )  # the edge is half of the way up, however high the object is there
     told = _smoothed(weights, np.ones_like(weights)) > SPARSE
     parts, _ = ndimage.label(((heights > least) & told) | (over & (counts == 0)))
     own = np.unique(parts[over & (parts > 0)])

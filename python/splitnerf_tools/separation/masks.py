@@ -7,13 +7,13 @@ import math
 import numpy as np
 import torch
 from scipy import ndimage
-from torch import Tensor
-from torch.nn.functional import interpolate, max_pool2d
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import directions_of_texels, texels_of_directions
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.render.rays import image_rays
+from torch import Tensor
+from torch.nn.functional import interpolate, max_pool2d
+
 from splitnerf_tools.separation.field import RadianceField
 from splitnerf_tools.separation.region import Region
 from splitnerf_tools.separation.walker import random_walk
@@ -49,7 +49,9 @@ def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tenso
 @torch.no_grad()
 def surface_points(field: RadianceField, dataset: Dataset) -> np.ndarray:
     """[n, 3] the points that the photos show, scene units: where half of a ray's light is gone."""
-    return np.concatenate([_points(field, *view_rays(dataset, i, _size(dataset, i, POINTS))) for i in range(len(dataset))])
+    return np.concatenate(
+        [_points(field, *view_rays(dataset, i, _size(dataset, i, POINTS))) for i in range(len(dataset))]
+    )
 
 
 @torch.no_grad()
@@ -70,7 +72,9 @@ def points_near(field: RadianceField, dataset: Dataset, region: Region) -> tuple
         meets = rays_o + ((table.offset - rays_o @ normal) / down)[:, None] * rays_d
         near = ((meets - centre).norm(dim=1) < reach) & (rays_d @ normal < -steep)
         points.append(_points(field, rays_o[near], rays_d[near]))
-        rows, columns = (((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, dataset.sizes[i].tolist()))
+        rows, columns = (
+            ((torch.arange(n) + 0.5) * whole / n).long() for n, whole in zip(size, dataset.sizes[i].tolist())
+        )
         photo = torch.from_numpy(np.asarray(dataset.images[i, ..., :3]))[rows][:, columns].reshape(-1, 3)
         colours.append(photo[near].numpy())
     return np.concatenate(points), np.concatenate(colours)
@@ -127,7 +131,9 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
 def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
     """A mask [h, w] whose outline is moved, by a few pixels at most, to where the photo's [h, w, 3] colours change."""
     inside = mask > 0.5
-    near = ndimage.binary_dilation(inside, iterations=BAND) & ~ndimage.binary_erosion(inside, iterations=BAND, border_value=1)
+    near = ndimage.binary_dilation(inside, iterations=BAND) & ~ndimage.binary_erosion(
+        inside, iterations=BAND, border_value=1
+    )
     hints = np.where(near, HINT * (2 * mask - 1), np.where(inside, CERTAIN, -CERTAIN))
     shares = random_walk(hints, photo, ndimage.binary_dilation(near), CONTRAST)
     return np.where(near, shares, inside).astype(np.float32)

@@ -32,7 +32,9 @@ class Region:
         solid: [CELLS, CELLS, CELLS] bool, the cells in which several photos show the object's surface; None: none are known.
     """
 
-    def __init__(self, cells: np.ndarray, table: Table | None, foot: Foot | None = None, solid: np.ndarray | None = None):
+    def __init__(
+        self, cells: np.ndarray, table: Table | None, foot: Foot | None = None, solid: np.ndarray | None = None
+    ):
         self.cells, self.table, self.foot = torch.from_numpy(cells), table, foot
         self.solid = torch.from_numpy(np.zeros_like(cells) if solid is None else solid)
 
@@ -130,7 +132,9 @@ def find_region(points: np.ndarray, table: Table | None, n_photos: int = 1) -> R
     taken = filled(taken) if table is None else down_to(table, filled(taken))
     grown = ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN)
     photo = np.repeat(np.arange(n_photos), -(-len(points) // n_photos))[: len(points)][chosen]
-    sights = np.unique(np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo)  # each photo once in a cell
+    sights = np.unique(
+        np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo
+    )  # each photo once in a cell
     seen_by = np.bincount(sights // n_photos, minlength=taken.size)
     return Region(grown, table, None, (seen_by.reshape(taken.shape) >= SEVERAL) & grown)
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.dataset import SURROUNDINGS, Dataset, spread
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
@@ -17,15 +16,18 @@ from splitnerf.data.reading import SEPARATION
 from splitnerf.errors import InputError
 from splitnerf.notes import note_once
 from splitnerf.progress import Progress, ended_by_signals, tracked
+
 from splitnerf_tools.separation.field import RadianceField
+from splitnerf_tools.separation.ground import Table, find_table
 from splitnerf_tools.separation.masks import find_mask, points_near, surface_points, surroundings
 from splitnerf_tools.separation.region import Region, find_region
-from splitnerf_tools.separation.ground import Table, find_table
 from splitnerf_tools.separation.training import train_field
 
 SHEET = "sheet.jpg"
 SHOWN, DIMMED = 12, 0.25  # photos on the sheet, and the factor of what is around the object
-BEFORE_MIDDLE = 0.7  # how far before the middle of the views a wall may stand, scene units: seen from one side, it is vague
+BEFORE_MIDDLE = (
+    0.7  # how far before the middle of the views a wall may stand, scene units: seen from one side, it is vague
+)
 NEAR_TABLE = 1.5  # distance from the middle within which points tell of the table, scene units
 MOST_POINTS = 20000  # of those that the search for the table takes
 
@@ -45,9 +47,7 @@ class Separated:
     seconds: float
 
 
-def separate(
-    train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int
-) -> Separated:
+def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> Separated:
     """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
@@ -66,15 +66,20 @@ def separate(
     """
     started = time.monotonic()
     data = train.root
-    note_once(f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}")
+    note_once(
+        f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}"
+    )
     usual = float(np.exp(np.log(train.exposures).mean()))  # the field knows colours in [0, 1]
     train, test = (split and split.exposed(split.exposures / usual) for split in (train, test))
     with ended_by_signals():
         with Progress(0.0) as bar:
             field = train_field(
-                train, steps=steps, minutes=minutes, seed=seed,
+                train,
+                steps=steps,
+                minutes=minutes,
+                seed=seed,
                 report=lambda share, told: bar.show(share, f"what is around the object, {told}"),
-            )  # fmt: skip
+            )
         points = surface_points(field, train)
         region = find_object(field, train, table_under(points, train, seed), points)
         shutil.rmtree(folder, ignore_errors=True)
@@ -93,7 +98,9 @@ def separate(
 def find_object(field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray) -> Region:
     """What stands in the middle of photos that show points [n, 3]. Raises InputError where nothing stands there."""
     if table is not None:
-        table = Table.through(table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64))
+        table = Table.through(
+            table.normal, table.offset, points[np.linalg.norm(points, axis=1) < NEAR_TABLE].astype(np.float64)
+        )
     region = find_region(points, table, len(photos))
     if region is None:
         raise InputError(f"{photos.root}: nothing stands out in the middle of the photos; add masks of the object")
@@ -138,8 +145,12 @@ def write_sheet(dataset: Dataset, folder: Path) -> None:
     rows, chosen = [], spread(range(len(dataset)), SHOWN)
     for i in chosen:
         photo = dataset.images[i, ..., :3]
-        mask = dataset.padded(resized_mask(read_image(folder / separated_mask(dataset.image_paths[i], dataset.root)), *dataset.sizes[i]))
+        mask = dataset.padded(
+            resized_mask(read_image(folder / separated_mask(dataset.image_paths[i], dataset.root)), *dataset.sizes[i])
+        )
         rows.append(photo * (DIMMED + (1 - DIMMED) * mask[..., None]))
     columns = -(-len(rows) // 3)
     rows += [np.zeros_like(rows[0])] * (3 * columns - len(rows))
-    write_image(folder / SHEET, np.concatenate([np.concatenate(rows[k * columns : (k + 1) * columns], 1) for k in range(3)]))
+    write_image(
+        folder / SHEET, np.concatenate([np.concatenate(rows[k * columns : (k + 1) * columns], 1) for k in range(3)])
+    )

@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable
 
 import torch
-from torch.nn.functional import smooth_l1_loss
-
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import at_unit_exposure, per_channel
 from splitnerf.render.rays import PixelSource
+from torch.nn.functional import smooth_l1_loss
+
 from splitnerf_tools.separation.field import RadianceField, search_loss, spread_loss
 
 RAYS = 1024  # of a step
@@ -57,10 +57,11 @@ def train_field(
         step += 1
         squared = float(apart.detach().square().mean())
         if not math.isfinite(squared):
-            raise RuntimeError(f"the field of what is around the object is no longer finite at step {step}; try another --seed")
+            raise RuntimeError(
+                f"the field of what is around the object is no longer finite at step {step}; try another --seed"
+            )
         error = squared if error is None else 0.98 * error + 0.02 * squared
         used = (time.monotonic() - started) / (60 * minutes) if minutes else 0.0
         share = min(1.0, max(step / steps, used))
         report(share, f"step {step} PSNR {-10 * math.log10(max(error, 1e-10)):.2f} dB")
     return field
-

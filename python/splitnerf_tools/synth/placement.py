@@ -7,7 +7,6 @@ import struct
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.gltf.geometry import scene_roots
 from splitnerf.files import atomic_path
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.json_files import write_json
@@ -16,6 +15,7 @@ from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.data.layouts.neus import CAMERAS, IMAGES, MASKS
 from splitnerf.data.layouts.stanford_orb import HDR, MAP_FROM_CAMERA, NOVEL, ground_truth
 from splitnerf.files import atomic_path
+
 from splitnerf_tools.synth.writer import Maps, SceneWriter, ViewWriter
 
 OBJECT = "asset"  # the name of the object in folders
@@ -42,7 +42,9 @@ class StanfordOrbWriter(ViewWriter):
         self._lights: dict[str | None, np.ndarray] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        self._lights[name] = super().light(environment) if name is None else environment  # the set's own file may round it
+        self._lights[name] = (
+            super().light(environment) if name is None else environment
+        )  # the set's own file may round it
         return self._lights[name]
 
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
@@ -87,7 +89,9 @@ class NeusWriter(ViewWriter):
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         number, (height, width) = len(self._matrices) // 2, maps["alpha"].shape
         focal = 0.5 * width / np.tan(0.5 * self.camera_angle_x)
-        k = np.array([[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]])  # the first pixel's middle is at 0
+        k = np.array(
+            [[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]]
+        )  # the first pixel's middle is at 0
         world = np.eye(4)
         world[:3] = k @ np.linalg.inv(pose @ OPENCV_AXES)[:3]
         self._matrices |= {f"world_mat_{number}": world, f"scale_mat_{number}": np.eye(4)}

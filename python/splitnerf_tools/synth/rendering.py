@@ -9,8 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment
 from splitnerf.data.gltf import read_asset
@@ -19,6 +17,8 @@ from splitnerf.errors import InputError
 from splitnerf.files import LOCK, locked
 from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
+from tqdm import tqdm
+
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.placement import write_placed_glb
 from splitnerf_tools.synth.published import NeusWriter, ShinyWriter, StanfordOrbWriter
@@ -116,7 +116,11 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
 
 
 def render_views(
-    renderer: AssetRenderer, writer: ViewWriter, light: np.ndarray, relight: dict[str, np.ndarray], settings: SynthSettings
+    renderer: AssetRenderer,
+    writer: ViewWriter,
+    light: np.ndarray,
+    relight: dict[str, np.ndarray],
+    settings: SynthSettings,
 ) -> None:
     """Renders all views and hands them to the writer.
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.export.meshing import extract_mesh
 

@@ -18,10 +18,9 @@ import abc
 from pathlib import Path
 
 import numpy as np
-
-from splitnerf.data.layouts import view_folders
 from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.relit import PREFIX, relit_path
 from splitnerf.export.mesh import write_mesh_ply
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment
 from splitnerf.data.frames import read_frames
@@ -23,6 +22,7 @@ from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
 from splitnerf.notes import note
+
 from splitnerf_tools.report.embedding import camera_of
 
 MOST_ROWS = 1024  # of a light
@@ -132,9 +132,7 @@ class ViewedAssets:
         with self._lock:
             lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
         return {
-            "sources": [
-                {"name": source.name, "light": source.light, "version": source.version} for source in sources
-            ],
+            "sources": [{"name": source.name, "light": source.light, "version": source.version} for source in sources],
             "lights": lights,
             "first_light": self._first,
             "white": self._white,
@@ -212,11 +210,15 @@ class ViewedPhotos:
         state."""
         return [
             {
-                "name": frame.name, "pose": frame.pose.ravel().tolist(), "intrinsics": lens_intrinsics(frame.lens, size).tolist(),
-                "width": size[1], "height": size[0], "exposure": frame.exposure,
+                "name": frame.name,
+                "pose": frame.pose.ravel().tolist(),
+                "intrinsics": lens_intrinsics(frame.lens, size).tolist(),
+                "width": size[1],
+                "height": size[0],
+                "exposure": frame.exposure,
             }
             for frame, size in zip(self._frames, self._sizes)
-        ]  # fmt: skip
+        ]
 
     def png(self, number: int) -> bytes:
         """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent at invalid pixels.
@@ -228,7 +230,9 @@ class ViewedPhotos:
         try:
             photo = load_photo(frame, factor, "object")
         except OSError as error:
-            raise InputError(f"{frame.image_path}: cannot be read ({reason(error)}); is the data's folder still there?") from None
+            raise InputError(
+                f"{frame.image_path}: cannot be read ({reason(error)}); is the data's folder still there?"
+            ) from None
         rgba = decoded(photo.rgba)
         if photo.known is not None:
             rgba[..., 3] *= photo.known

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
 from splitnerf.render.path_traced import AssetRenderer
+
 from splitnerf_tools.report.embedding import as_halves
 from splitnerf_tools.view.assets import ViewedAssets
 
@@ -56,7 +56,12 @@ class Camera:
         except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"the camera cannot be read ({type(error).__name__}); load the page again") from None
         sizes = 1 <= min(width, height) and max(width, height) <= LARGEST_SIDE and width * height <= MOST_PIXELS
-        lens = len(intrinsics) == 4 and np.isfinite(intrinsics).all() and 1e-3 < min(intrinsics[:2]) and max(map(abs, intrinsics)) < 1e7
+        lens = (
+            len(intrinsics) == 4
+            and np.isfinite(intrinsics).all()
+            and 1e-3 < min(intrinsics[:2])
+            and max(map(abs, intrinsics)) < 1e7
+        )
         if not (sizes and lens and len(lights) == n_assets and abs(turn) <= 3600):
             raise InputError("the camera has numbers beyond reason; load the page again")
         return Camera(checked_pose(pose, "the camera's pose"), intrinsics, width, height, lights, turn)
@@ -67,7 +72,9 @@ class Camera:
         width, height = (max(1, round(share * pixels)) for pixels in (self.width, self.height))
         fx, fy, cx, cy = self.intrinsics
         across, down = width / self.width, height / self.height
-        return Camera(self.pose, (fx * across, fy * down, cx * across, cy * down), width, height, self.lights, self.turn)
+        return Camera(
+            self.pose, (fx * across, fy * down, cx * across, cy * down), width, height, self.lights, self.turn
+        )
 
 
 @dataclass(frozen=True)
@@ -136,7 +143,11 @@ class Tracer:
         return self._renderers[asset][1]
 
     def _refined(
-        self, camera: Camera, scenes: list[tuple[AssetRenderer, np.ndarray]], passes: tuple[int, ...], ended: Callable[[], bool]
+        self,
+        camera: Camera,
+        scenes: list[tuple[AssetRenderer, np.ndarray]],
+        passes: tuple[int, ...],
+        ended: Callable[[], bool],
     ) -> Iterator[Picture]:
         """The mean of all passes so far, after each pass, for each asset with its light; a slow reader blocks no other
         request."""
@@ -151,7 +162,13 @@ class Tracer:
                 yield Picture(asset, width, height, total, content)
 
     def _add(
-        self, total: np.ndarray, scene: tuple[AssetRenderer, np.ndarray], camera: Camera, spp: int, seed: int, ended: Callable[[], bool]
+        self,
+        total: np.ndarray,
+        scene: tuple[AssetRenderer, np.ndarray],
+        camera: Camera,
+        spp: int,
+        seed: int,
+        ended: Callable[[], bool],
     ) -> bool:
         """Adds spp paths a pixel, some rows at a time; False where it ended before."""
         renderer, light = scene
@@ -165,8 +182,14 @@ class Tracer:
                     return False
                 paths = min(spp_a_call, spp - call * spp_a_call)
                 images = renderer.render(
-                    light, camera.pose, (fx, fy, cx, cy - top), camera.width, len(strip), spp=paths, seed=_seed(seed, top, call),
-                )  # fmt: skip
+                    light,
+                    camera.pose,
+                    (fx, fy, cx, cy - top),
+                    camera.width,
+                    len(strip),
+                    spp=paths,
+                    seed=_seed(seed, top, call),
+                )
                 strip[..., :3] += paths * images["radiance"]
                 strip[..., 3] += paths * images["alpha"]
         return True

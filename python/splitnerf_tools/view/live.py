@@ -10,14 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
 from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.asset import Asset
 from splitnerf.data.normalisation import transform_points
 from splitnerf.errors import InputError, plain
+from splitnerf.training.loop import Training
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Event, Request
-from splitnerf.training.loop import Training
+
 from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedLight
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.training_asset import training_asset, training_glb
@@ -26,7 +26,11 @@ STATE_EVERY = 0.5  # seconds between two states
 # least seconds between two surfaces, and the largest share of the time that they take
 ASSET_EVERY, ASSET_SHARE = 4.0, 0.05
 LIGHT_HEIGHT = 64  # rows of the light while it is recovered
-REQUESTS = {"pause": Request.PAUSE, "checkpoint": Request.SAVE, "stop": Request.STOP}  # of the buttons; "resume" takes one back
+REQUESTS = {
+    "pause": Request.PAUSE,
+    "checkpoint": Request.SAVE,
+    "stop": Request.STOP,
+}  # of the buttons; "resume" takes one back
 ANSWERS = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
 CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
 
@@ -60,8 +64,17 @@ class Live:
         self._saving = False
         self._delivered: Path | None = None
         self.events.update(
-            stage="preparation", step=0, steps=None, progress=0.0, left=None, psnr=None, paused=False, version=0, lines=0, saved=None,
-        )  # fmt: skip
+            stage="preparation",
+            step=0,
+            steps=None,
+            progress=0.0,
+            left=None,
+            psnr=None,
+            paused=False,
+            version=0,
+            lines=0,
+            saved=None,
+        )
 
     # ---- called by the training's thread ----
 
@@ -150,7 +163,11 @@ class Live:
         """The first camera has the whole ball of radius 1 in view, in which normalisation puts the object."""
         corners = np.concatenate([np.eye(3), -np.eye(3)]).astype(np.float32)
         self.shown.frame = Asset(
-            "frame", transform_points(world_from_box, corners), np.int32([[0, 1, 2], [3, 4, 5]]), corners, np.zeros(2, np.int32)
+            "frame",
+            transform_points(world_from_box, corners),
+            np.int32([[0, 1, 2], [3, 4, 5]]),
+            corners,
+            np.zeros(2, np.int32),
         )
 
     def _tell(self, training: Training, **changes: object) -> None:
@@ -160,9 +177,14 @@ class Live:
             left = (training.seconds - seconds) * (1.0 - training.progress) / gained
         self._state_at = time.monotonic()
         self.events.update(
-            step=training.step, steps=None if steps >= UNLIMITED else steps, progress=training.progress, left=left,
-            psnr=_rounded(training.log.psnr), lines=len(self._lines), **changes,
-        )  # fmt: skip
+            step=training.step,
+            steps=None if steps >= UNLIMITED else steps,
+            progress=training.progress,
+            left=left,
+            psnr=_rounded(training.log.psnr),
+            lines=len(self._lines),
+            **changes,
+        )
 
     def _show(self, training: Training) -> None:
         """Sends the state if the last one is old enough, with a new surface if one is wanted."""
@@ -186,7 +208,9 @@ class Live:
         except RuntimeError:  # no surface yet, or one that the training itself refuses
             return old.version
         self.shown.add_light(ViewedLight("recovered light", light), self._light)
-        self.shown.sources[0] = Source(self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1)
+        self.shown.sources[0] = Source(
+            self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1
+        )
         return old.version + 1
 
     def _request(self) -> Request | None:

@@ -26,6 +26,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
+
 from splitnerf_tools.report.embedding import as_halves
 from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.events import EventStream
@@ -81,9 +82,13 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     request_queue_size = MOST_OPEN  # connections that wait; more would try again after a second
 
     def __init__(
-        self, shown: ViewedAssets, photos: ViewedPhotos | None = None, host: str = "127.0.0.1", port: int = 0,
+        self,
+        shown: ViewedAssets,
+        photos: ViewedPhotos | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
         live: Live | None = None,
-    ):  # fmt: skip
+    ):
         self.shown, self.photos, self.host, self.tracer, self.live = shown, photos, host, Tracer(shown), live
         self.events = EventStream() if live is None else live.events
         self.page = files("splitnerf_tools.view").joinpath("viewer.html").read_bytes()
@@ -94,8 +99,12 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         try:
             super().__init__((host, port), Handler)
         except OSError as error:
-            raise InputError(f"{host}, port {port}: cannot be listened at ({reason(error)}); give another --host or --port") from None
-        name = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(host, f"[{host}]" if ":" in host else host)
+            raise InputError(
+                f"{host}, port {port}: cannot be listened at ({reason(error)}); give another --host or --port"
+            ) from None
+        name = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(
+            host, f"[{host}]" if ":" in host else host
+        )
         self.url = f"http://{name}:{self.server_address[1]}/{self._token}/"
 
     def inner_path(self, path: str) -> str | None:
@@ -169,10 +178,17 @@ class Handler(BaseHTTPRequestHandler):
     server_version, sys_version = "splitnerf", ""
 
     def do_GET(self) -> None:
-        self._answered({
-            "": self._page, "scene.json": self._scene, "assets": self._asset, "lights": self._light,
-            "photos": self._photo, "events": self._events, "curves": self._curves,
-        })  # fmt: skip
+        self._answered(
+            {
+                "": self._page,
+                "scene.json": self._scene,
+                "assets": self._asset,
+                "lights": self._light,
+                "photos": self._photo,
+                "events": self._events,
+                "curves": self._curves,
+            }
+        )
 
     def do_POST(self) -> None:
         self._answered({"lights": self._dropped, "final": self._final, "control": self._control})
@@ -198,10 +214,14 @@ class Handler(BaseHTTPRequestHandler):
         origin = self.headers.get("Origin")
         own = self.server.is_own(self.headers.get("Host", ""))
         if not own or (origin is not None and not (origin.startswith("http://") and self.server.is_own(origin[7:]))):
-            raise Refused(HTTPStatus.FORBIDDEN, "this request comes from another page; open the address that splitnerf printed")
+            raise Refused(
+                HTTPStatus.FORBIDDEN, "this request comes from another page; open the address that splitnerf printed"
+            )
         inner = self.server.inner_path(urlsplit(self.path).path)
         if inner is None:
-            raise Refused(HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed")
+            raise Refused(
+                HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed"
+            )
         self.connection.settimeout(TIMEOUT)
         return inner
 
@@ -212,7 +232,9 @@ class Handler(BaseHTTPRequestHandler):
         if self.server.live is not None:
             self.server.live.load()
         cameras = [] if self.server.photos is None else self.server.photos.cameras()
-        self._send_json(self.server.shown.description() | {"cameras": cameras, "training": self.server.live is not None})
+        self._send_json(
+            self.server.shown.description() | {"cameras": cameras, "training": self.server.live is not None}
+        )
 
     def _asset(self, rest: str) -> None:
         source = self._source(rest)
@@ -286,7 +308,9 @@ class Handler(BaseHTTPRequestHandler):
         if not (length.isascii() and length.isdigit() and len(length) < 16):
             raise Refused(HTTPStatus.LENGTH_REQUIRED, "the request does not say how long it is")
         if int(length) > most:
-            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the file is larger than {most >> 20} MB; make it smaller")
+            raise Refused(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the file is larger than {most >> 20} MB; make it smaller"
+            )
         body = self.rfile.read(int(length))
         if len(body) < int(length):
             raise Refused(HTTPStatus.BAD_REQUEST, "the request ended early")

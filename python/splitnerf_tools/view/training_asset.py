@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.normalisation import transform_points
 from splitnerf.export.glb import glb_content
 from splitnerf.export.meshing import extract_mesh
-from splitnerf.export.surface import surface_materials
 from splitnerf.export.scene import surface_of
+from splitnerf.export.surface import surface_materials
 from splitnerf.render.model import SceneModel
 
 RESOLUTION = 128  # nodes along an edge of the box
@@ -39,11 +38,15 @@ def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: in
     albedo, roughness, metallic, normals = surface_materials(surface, vertices)
     pairs = np.clip(np.column_stack([roughness, metallic]), 0, 1)
     return Asset(
-        name="growing", vertices=transform_points(world_from_box, vertices), triangles=faces, normals=normals,
-        material_ids=np.zeros(len(faces), np.int32), colors=np.clip(albedo, 0, 1),
+        name="growing",
+        vertices=transform_points(world_from_box, vertices),
+        triangles=faces,
+        normals=normals,
+        material_ids=np.zeros(len(faces), np.int32),
+        colors=np.clip(albedo, 0, 1),
         uv=((pairs * (LEVELS - 1) + 0.5) / LEVELS).astype(np.float32),
         materials=[Material(metallic=1.0, roughness_metallic_texture=all_pairs(LEVELS))],
-    )  # fmt: skip
+    )
 
 
 def all_pairs(levels: int) -> np.ndarray:

@@ -107,7 +107,7 @@ template <class T> T add_atomically(T* to, T value) {
 #define __syncwarp() \
   static_cast<void>( \
       cuda_on_cpu::exchange(cuda_on_cpu::Operation::kWarpBarrier, ~0u, 0, cuda_on_cpu::lane(), CUDA_ON_CPU_HERE))
-#define __shfl_sync(mask, value, from) cuda_on_cpu::shuffle(mask, value, (from)&31, CUDA_ON_CPU_HERE)
+#define __shfl_sync(mask, value, from) cuda_on_cpu::shuffle(mask, value, (from) & 31, CUDA_ON_CPU_HERE)
 #define __shfl_xor_sync(mask, value, bits) \
   cuda_on_cpu::shuffle(mask, value, cuda_on_cpu::lane() ^ (bits), CUDA_ON_CPU_HERE)
 #define __shfl_up_sync(mask, value, step)                                                                       \

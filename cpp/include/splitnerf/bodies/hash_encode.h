@@ -31,7 +31,9 @@ template <class T, int F, class S> SPLITNERF_HD Pack<T, F> load_entry(const S* f
 }
 
 // The features of one level at a point, and their derivatives by its position.
-template <class T, int F> struct LevelFeatures { Pack<T, F> value{}, dx{}, dy{}, dz{}; };
+template <class T, int F> struct LevelFeatures {
+  Pack<T, F> value{}, dx{}, dy{}, dz{};
+};
 template <int F, class T, class S>
 SPLITNERF_HD LevelFeatures<T, F> level_features(const HashLevel& level, const S* table, Vec3<T> position) {
   const HashCell<T> cell = hash_cell(level, position);

@@ -86,10 +86,9 @@ template <class T, class Light, class Receive> struct SumLightBackwardBody {
   Receive receive;
 
   template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t p) const {
-    const LightSumsGrad<T> out =
-        sum_light_backward(group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
-                           load_sums(grad_sums + 3 * kLightSums * p),
-                           [&](int i, Vec3<T> grad) { receive(p, i, grad); });
+    const LightSumsGrad<T> out = sum_light_backward(
+        group, load3(normals + 3 * p), load3(view_dirs + 3 * p), roughness[p], n, light.of_point(p),
+        load_sums(grad_sums + 3 * kLightSums * p), [&](int i, Vec3<T> grad) { receive(p, i, grad); });
     if (group.lane() > 0) return;
     store3(grad_normals + 3 * p, out.normal);
     grad_roughness[p] = out.roughness;

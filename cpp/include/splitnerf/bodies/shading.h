@@ -104,8 +104,12 @@ template <class T> struct ShadeBackwardBody {
 SPLITNERF_ON_GPU(ShadeBackwardBody);
 
 template <class T> SPLITNERF_HD SummedPoint<T> load_summed_point(const SummedArrays<const T>& in, int64_t i) {
-  return {load3(in.normals + 3 * i), load3(in.view_dirs + 3 * i), load3(in.albedo + 3 * i),
-          in.roughness[i],           in.metallic[i],              load_sums(in.sums + 3 * kLightSums * i)};
+  return {load3(in.normals + 3 * i),
+          load3(in.view_dirs + 3 * i),
+          load3(in.albedo + 3 * i),
+          in.roughness[i],
+          in.metallic[i],
+          load_sums(in.sums + 3 * kLightSums * i)};
 }
 
 // The radiance of the sums; or, where another radiance is given, the difference to it times a share: what turns that one into a

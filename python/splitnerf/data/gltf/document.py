@@ -90,9 +90,12 @@ class Document:
             sparse = accessor["sparse"]
             where, what = sparse["indices"], sparse["values"]
             rows = self._table(
-                where["bufferView"], where.get("byteOffset", 0), np.dtype(COMPONENTS[where["componentType"]]), 1,
+                where["bufferView"],
+                where.get("byteOffset", 0),
+                np.dtype(COMPONENTS[where["componentType"]]),
+                1,
                 sparse["count"],
-            )  # fmt: skip
+            )
             values = values.copy()
             values[rows[:, 0]] = self._table(
                 what["bufferView"], what.get("byteOffset", 0), dtype, width, sparse["count"]

@@ -29,11 +29,19 @@ from splitnerf.notes import note_once
 PLACES = ("sparse", "colmap/sparse")
 IMAGES, MASKS = "images", "masks"
 PARAMETERS = {
-    "SIMPLE_PINHOLE": "fl_x cx cy", "PINHOLE": "fl_x fl_y cx cy", "SIMPLE_RADIAL": "fl_x cx cy k1",
-    "RADIAL": "fl_x cx cy k1 k2", "OPENCV": "fl_x fl_y cx cy k1 k2 p1 p2", "OPENCV_FISHEYE": "fl_x fl_y cx cy k1 k2 k3 k4",
-    "FULL_OPENCV": "", "FOV": "", "SIMPLE_RADIAL_FISHEYE": "fl_x cx cy k1", "RADIAL_FISHEYE": "fl_x cx cy k1 k2",
-    "THIN_PRISM_FISHEYE": "", "RAD_TAN_THIN_PRISM_FISHEYE": "",
-}  # fmt: skip
+    "SIMPLE_PINHOLE": "fl_x cx cy",
+    "PINHOLE": "fl_x fl_y cx cy",
+    "SIMPLE_RADIAL": "fl_x cx cy k1",
+    "RADIAL": "fl_x cx cy k1 k2",
+    "OPENCV": "fl_x fl_y cx cy k1 k2 p1 p2",
+    "OPENCV_FISHEYE": "fl_x fl_y cx cy k1 k2 k3 k4",
+    "FULL_OPENCV": "",
+    "FOV": "",
+    "SIMPLE_RADIAL_FISHEYE": "fl_x cx cy k1",
+    "RADIAL_FISHEYE": "fl_x cx cy k1 k2",
+    "THIN_PRISM_FISHEYE": "",
+    "RAD_TAN_THIN_PRISM_FISHEYE": "",
+}
 """The parameters of the camera models by a transforms file's names, in the order of COLMAP's numbers; "" is not read."""
 POINT_BYTES = 24  # of an image point: x, y and the number of its 3D point
 LONGEST_NAME = 4096  # bytes
@@ -91,7 +99,9 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
                     found[folder] = files
     if not found:
         return None
-    largest = next(iter(found)) if len(found) == 1 else max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
+    largest = (
+        next(iter(found)) if len(found) == 1 else max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
+    )
     if len(found) > 1:
         note_once(f"{root}: has {len(found)} COLMAP models; the one with the most images is read", str(largest))
     return found[largest]
@@ -151,7 +161,9 @@ def _lens_numbers(model: str, width: int, height: int, parameters: tuple[float, 
             f"image_undistorter`, or use one of {', '.join(MODELS)}"
         )
     if len(names) != len(parameters):
-        raise InputError(f"{path}: a camera {model} has {len(parameters)} parameters, not {len(names)}; replace the model")
+        raise InputError(
+            f"{path}: a camera {model} has {len(parameters)} parameters, not {len(names)}; replace the model"
+        )
     return dict(zip(names, parameters)) | {"camera_model": model, "w": width, "h": height}
 
 
@@ -182,6 +194,8 @@ def _camera_to_world(motion: tuple[float, ...]) -> np.ndarray:
     camera, OpenCV axes; NaN where the quaternion is 0."""
     pose = np.eye(4)
     largest = np.abs(motion[:4]).max()
-    rotation = Rotation.from_quat(np.roll(motion[:4], -1) / largest).as_matrix().T if largest > 0 else np.full((3, 3), np.nan)
+    rotation = (
+        Rotation.from_quat(np.roll(motion[:4], -1) / largest).as_matrix().T if largest > 0 else np.full((3, 3), np.nan)
+    )
     pose[:3, :3], pose[:3, 3] = rotation, -rotation @ motion[4:]
     return pose @ OPENCV_AXES

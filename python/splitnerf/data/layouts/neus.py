@@ -53,10 +53,16 @@ def read(root: Path, split: None = None) -> list[Frame]:
         name = f"{root / CAMERAS}: world_mat_{i}"
         intrinsics, pose = decompose(matrix, name)
         numbers = dict(zip(("fl_x", "fl_y", "cx", "cy"), intrinsics.tolist()))
-        frames.append(Frame(
-            image.stem, image, checked_pose(pose, name), read_lens(numbers, name)[0],
-            mask_path=masks[i] if masks else None, mask_kind="object",
-        ))  # fmt: skip
+        frames.append(
+            Frame(
+                image.stem,
+                image,
+                checked_pose(pose, name),
+                read_lens(numbers, name)[0],
+                mask_path=masks[i] if masks else None,
+                mask_kind="object",
+            )
+        )
     return frames
 
 
@@ -111,4 +117,8 @@ def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _pictures(folder: Path) -> list[Path]:
     """The images of a folder by name; none where it does not exist."""
-    return sorted(path for path in folder.glob("*") if path.suffix.lower() in LDR_SUFFIXES and path.is_file() and not path.name.startswith("._"))
+    return sorted(
+        path
+        for path in folder.glob("*")
+        if path.suffix.lower() in LDR_SUFFIXES and path.is_file() and not path.name.startswith("._")
+    )

@@ -1,13 +1,13 @@
 """Stanford-ORB, a capture in the blender form: `blender_HDR/OBJECT_scene00N` or `blender_LDR/OBJECT_scene00N`.
 
-    transforms_train.json, transforms_test.json   as NeRF-Blender's, without suffixes; poses have OpenGL axes
-    train/0000.exr or .png, test/...              RGB: linear radiance, or sRGB
-    train_mask/0000.png, test_mask/...            white is the object
-    transforms_novel.json                         photos of the same object in other scenes: `scene_name`, the capture whose
-                                                  folder beside this one holds the photo; its own `camera_angle_x`; the pose in
-                                                  this capture's world
-    ../../ground_truth/SCENE/env_map/0000.exr     the light of the photo SCENE/test/0000, in the axes of its camera (OpenGL):
-                                                  -z in the map's centre, +x to the right of it, y up
+transforms_train.json, transforms_test.json   as NeRF-Blender's, without suffixes; poses have OpenGL axes
+train/0000.exr or .png, test/...              RGB: linear radiance, or sRGB
+train_mask/0000.png, test_mask/...            white is the object
+transforms_novel.json                         photos of the same object in other scenes: `scene_name`, the capture whose
+                                              folder beside this one holds the photo; its own `camera_angle_x`; the pose in
+                                              this capture's world
+../../ground_truth/SCENE/env_map/0000.exr     the light of the photo SCENE/test/0000, in the axes of its camera (OpenGL):
+                                              -z in the map's centre, +x to the right of it, y up
 """
 
 from __future__ import annotations
@@ -50,10 +50,14 @@ def relit(root: Path, maps: dict[str, Path], truth: Path | None = None) -> list[
     path, views = root / NOVEL, []
     meta, entries = transforms.read_entries(path)
     for index, entry in enumerate(entries):
-        scene = folder_name(need(entry, "scene_name", path, f" in frame {index}"), f"{path}: 'scene_name' of frame {index}")
+        scene = folder_name(
+            need(entry, "scene_name", path, f" in frame {index}"), f"{path}: 'scene_name' of frame {index}"
+        )
         frame = _with_mask(transforms.read_frame(entry, meta, index, path, root.absolute().parent / scene))
         turn = MAP_FROM_CAMERA @ frame.pose[:3, :3].T
-        light = (ground_truth(root, scene) if truth is None else truth / scene) / "env_map" / f"{frame.image_path.stem}.exr"
+        light = (
+            (ground_truth(root, scene) if truth is None else truth / scene) / "env_map" / f"{frame.image_path.stem}.exr"
+        )
         views.append(LitView(frame, scene, map_in_world(light, turn)))
     return views
 
@@ -65,4 +69,6 @@ def ground_truth(root: Path, scene: str | None = None) -> Path:
 
 def _with_mask(frame: Frame) -> Frame:
     image = frame.image_path
-    return replace(frame, mask_path=image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png", mask_kind="object")
+    return replace(
+        frame, mask_path=image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png", mask_kind="object"
+    )

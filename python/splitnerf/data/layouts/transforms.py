@@ -119,7 +119,9 @@ def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
     chosen = _listed(meta, "train_filenames")
     others = set().union(*(_listed(meta, key) for key in SPLITS["test"]))
     if chosen & others:
-        note_once("images that transforms.json lists for training and for testing are for testing", sorted(chosen & others)[0])
+        note_once(
+            "images that transforms.json lists for training and for testing are for testing", sorted(chosen & others)[0]
+        )
     return lambda name: name not in others and (not chosen or name in chosen)
 
 
@@ -157,18 +159,29 @@ def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | N
     pose, lens, distortion = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
     mask_kind = entry.get("mask_kind", meta.get("mask_kind", "auto"))
     if mask_kind not in MASK_KINDS:
-        raise InputError(f"{path}: 'mask_kind' must be one of {', '.join(MASK_KINDS)}, got {str(mask_kind)[:40]!r}; repair it")
+        raise InputError(
+            f"{path}: 'mask_kind' must be one of {', '.join(MASK_KINDS)}, got {str(mask_kind)[:40]!r}; repair it"
+        )
     return Frame(
-        image_path.stem, image_path, pose, lens, distortion, mask_path, mask_kind,
-        dynamic_mask_path=dynamic if is_file(dynamic) else None, exposure=_read_exposure(entry, index, path),
+        image_path.stem,
+        image_path,
+        pose,
+        lens,
+        distortion,
+        mask_path,
+        mask_kind,
+        dynamic_mask_path=dynamic if is_file(dynamic) else None,
+        exposure=_read_exposure(entry, index, path),
         gamma=_read_gamma(entry.get("gamma", meta.get("gamma", 0.0)), path),
-    )  # fmt: skip
+    )
 
 
 def _read_exposure(entry: dict, index: int, path: Path) -> float:
     exposure = entry.get("exposure", 1.0)
     if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
-        raise InputError(f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it")
+        raise InputError(
+            f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it"
+        )
     return float(exposure)
 
 

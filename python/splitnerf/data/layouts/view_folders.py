@@ -68,7 +68,9 @@ def relit(root: Path, maps: dict[str, Path]) -> list[LitView]:
                 views.append(LitView(replace(frame, image_path=image), name, map_in_world(path)))
     if not views:
         names = ", ".join(maps) or "no map"
-        raise InputError(f"{root}: no test view has a photo under {names}; give --maps the folder of the set's test lights")
+        raise InputError(
+            f"{root}: no test view has a photo under {names}; give --maps the folder of the set's test lights"
+        )
     return views
 
 

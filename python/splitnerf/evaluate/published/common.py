@@ -152,5 +152,7 @@ def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
         InputError: One of them is empty.
     """
     if not len(points) or not len(targets):
-        raise InputError("nothing is left to compare: the mesh and the truth do not show the same place; check the data")
+        raise InputError(
+            "nothing is left to compare: the mesh and the truth do not show the same place; check the data"
+        )
     return cKDTree(targets).query(points)[0]

@@ -30,10 +30,11 @@ def read_truth(frame: Frame) -> FolderTruth:
     rgba = _read(frame.image_path)
     albedo, normal = (frame.image_path.with_name(name) for name in ("albedo.png", "normal.png"))
     return FolderTruth(
-        over_background(rgba[..., :3], rgba[..., 3]), rgba[..., 3],
+        over_background(rgba[..., :3], rgba[..., 3]),
+        rgba[..., 3],
         _read(albedo)[..., :3] if albedo.is_file() else None,
         unit(2 * _read(normal)[..., :3] - 1) if normal.is_file() else None,
-    )  # fmt: skip
+    )
 
 
 def lights_of(root: Path, options: Options) -> dict[str, Path]:

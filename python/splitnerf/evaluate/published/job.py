@@ -52,9 +52,13 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
     if missing:
         scores.notes.append(f"LPIPS was not computed: {missing}")
     return {
-        "protocol": name, "scores": scores.means, "images": scores.images, "notes": scores.notes, "published": published(name),
+        "protocol": name,
+        "scores": scores.means,
+        "images": scores.images,
+        "notes": scores.notes,
+        "published": published(name),
         "spp": options.spp,
-    }  # fmt: skip
+    }
 
 
 def holds_published(path: Path) -> bool:

@@ -32,10 +32,15 @@ from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("lpips", "relit, LPIPS", "{:.3f}"),
-    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("albedo_ssim", "albedo, SSIM", "{:.3f}"),
-    ("albedo_lpips", "albedo, LPIPS", "{:.3f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("normals", "normals, degrees", "{:.2f}"),
-)  # fmt: skip
+    ("psnr", "relit, PSNR", "{:.2f}"),
+    ("ssim", "relit, SSIM", "{:.3f}"),
+    ("lpips", "relit, LPIPS", "{:.3f}"),
+    ("albedo_psnr", "albedo, PSNR", "{:.2f}"),
+    ("albedo_ssim", "albedo, SSIM", "{:.3f}"),
+    ("albedo_lpips", "albedo, LPIPS", "{:.3f}"),
+    ("view_psnr", "novel, PSNR", "{:.2f}"),
+    ("normals", "normals, degrees", "{:.2f}"),
+)
 VALIDATION, TEST = range(8), (49, 99, 149, 199)
 OPAQUE = 0.9
 
@@ -55,7 +60,10 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
         if delivered.environment is not None:
             result["view_psnr"] = psnr(srgb_on_white(maps), truth.image)
         if truth.albedo is not None:
-            ours, theirs = albedo_on_white(maps["albedo"], maps["alpha"], scale), albedo_on_white(truth.albedo, truth.alpha)
+            ours, theirs = (
+                albedo_on_white(maps["albedo"], maps["alpha"], scale),
+                albedo_on_white(truth.albedo, truth.alpha),
+            )
             result |= compared(ours, theirs, options, "albedo_")
         solid = (truth.alpha > OPAQUE) & (maps["alpha"] > OPAQUE)
         if truth.normal is not None and solid.any():
@@ -82,5 +90,7 @@ def chosen(views: list[LitView], root: Path) -> list[LitView]:
     """The views of the paper's table. Raises InputError where the data have none of them."""
     kept = [view for view in views if int(view.frame.name.rsplit("_", 1)[1]) in TEST]
     if not kept:
-        raise InputError(f"{root}: has none of the test views {', '.join(map(str, TEST))}, which the protocol takes; add them")
+        raise InputError(
+            f"{root}: has none of the test views {', '.join(map(str, TEST))}, which the protocol takes; add them"
+        )
     return kept

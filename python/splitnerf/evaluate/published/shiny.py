@@ -29,9 +29,11 @@ from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"), ("view_lpips", "novel, LPIPS", "{:.3f}"),
+    ("view_psnr", "novel, PSNR", "{:.2f}"),
+    ("view_ssim", "novel, SSIM", "{:.3f}"),
+    ("view_lpips", "novel, LPIPS", "{:.3f}"),
     ("normals", "normals, degrees", "{:.2f}"),
-)  # fmt: skip
+)
 
 
 def score(delivered: Delivered, root: Path, options: Options) -> Scores:
@@ -62,7 +64,9 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
 def _rgba(frame: Frame) -> np.ndarray:
     """[H, W, 4] the photo of a pinhole, its alpha the object's."""
     if frame.distortion is not None or frame.mask_path is not None or frame.exposure != 1 or frame.gamma:
-        raise InputError(f"{frame.image_path}: the frame has distortion, a mask or a curve, which the set does not have; leave it out")
+        raise InputError(
+            f"{frame.image_path}: the frame has distortion, a mask or a curve, which the set does not have; leave it out"
+        )
     rgba = read_image(frame.image_path)
     if rgba.shape[2] != 4:
         raise InputError(f"{frame.image_path}: has no alpha, which the set's photos have; give photos with it")

@@ -19,16 +19,20 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.layouts.lit import read_lit_photo
 from splitnerf.data.truth import read_mesh
 from splitnerf.errors import InputError
-from splitnerf.files import is_file
 from splitnerf.evaluate.metrics import lsq_scale, psnr
 from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, mean_of, nearest, unit
+from splitnerf.files import is_file
 from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("psnr_h", "relit, PSNR-H", "{:.2f}"), ("psnr_l", "relit, PSNR-L", "{:.2f}"), ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
-    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"), ("normals", "normals, 1 - cos", "{:.3f}"), ("chamfer", "chamfer, 2e3", "{:.2f}"),
-)  # fmt: skip
+    ("psnr_h", "relit, PSNR-H", "{:.2f}"),
+    ("psnr_l", "relit, PSNR-L", "{:.2f}"),
+    ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
+    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"),
+    ("normals", "normals, 1 - cos", "{:.3f}"),
+    ("chamfer", "chamfer, 2e3", "{:.2f}"),
+)
 SIDE = 512  # pixels at which images are compared
 EROSION = np.ones((5, 5), bool)
 BRIGHTEST = 4.0  # where PSNR-H clips
@@ -149,7 +153,9 @@ def _chamfer(delivered: Delivered, root: Path, options: Options) -> float | None
     path = _truth(root, options) / "mesh_blender" / "mesh.obj"
     if not path.is_file():
         return None
-    return chamfer(trimesh.Trimesh(delivered.vertices, delivered.asset.triangles, process=False), read_mesh(path).vertices)
+    return chamfer(
+        trimesh.Trimesh(delivered.vertices, delivered.asset.triangles, process=False), read_mesh(path).vertices
+    )
 
 
 def _truth(root: Path, options: Options) -> Path:

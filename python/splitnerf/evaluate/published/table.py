@@ -10,8 +10,11 @@ from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
 from splitnerf.evaluate.published.common import Column
 
 PROTOCOLS: dict[str, ModuleType] = {
-    "stanford-orb": stanford_orb, "nerfactor": nerfactor, "tensoir": tensoir, "shiny": shiny,
-}  # fmt: skip
+    "stanford-orb": stanford_orb,
+    "nerfactor": nerfactor,
+    "tensoir": tensoir,
+    "shiny": shiny,
+}
 NUMBERS = Path(__file__).with_name("numbers.json")
 
 

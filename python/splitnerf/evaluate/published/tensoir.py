@@ -32,10 +32,15 @@ from splitnerf.progress import tracked
 
 LAYOUT = layout
 COLUMNS: tuple[Column, ...] = (
-    ("psnr", "relit, PSNR", "{:.2f}"), ("ssim", "relit, SSIM", "{:.3f}"), ("lpips", "relit, LPIPS", "{:.3f}"),
-    ("albedo_psnr", "albedo, PSNR", "{:.2f}"), ("view_psnr", "novel, PSNR", "{:.2f}"), ("view_ssim", "novel, SSIM", "{:.3f}"),
-    ("view_lpips", "novel, LPIPS", "{:.3f}"), ("normals", "normals, degrees", "{:.2f}"),
-)  # fmt: skip
+    ("psnr", "relit, PSNR", "{:.2f}"),
+    ("ssim", "relit, SSIM", "{:.3f}"),
+    ("lpips", "relit, LPIPS", "{:.3f}"),
+    ("albedo_psnr", "albedo, PSNR", "{:.2f}"),
+    ("view_psnr", "novel, PSNR", "{:.2f}"),
+    ("view_ssim", "novel, SSIM", "{:.3f}"),
+    ("view_lpips", "novel, LPIPS", "{:.3f}"),
+    ("normals", "normals, degrees", "{:.2f}"),
+)
 LIGHTS = ("bridge", "city", "fireplace", "forest", "night")
 SCALE_VIEWS = 20
 GAMMA = 2.2
