@@ -6,7 +6,7 @@
 //
 // Counted for preset fast: 39,000 points, 16 levels of 2 features in 16 bits, 64 units, 13 outputs. It never ran on a GPU.
 //
-//   forward    15,500 operations a point, .6 GFLOP: 10 to 12 us at the 50 to 60 TFLOP/s that an H100 and an H200 reach in float32.
+//   forward    15,500 operations a point, 0.6 GFLOP: 10 to 12 us at the 50 to 60 TFLOP/s that an H100 and an H200 reach in float32.
 //              Memory: 204 bytes a point, 8 MB, 2.4 us on an H100, 1.7 us on an H200. The gathers, from the L2 cache, are 512 bytes
 //              a point, 20 MB, and up to 160 MB in sectors of 32 bytes, 29 us, where no two of a point's neighbours meet.
 //   backward   40,000 operations a point, 1.6 GFLOP: 26 to 31 us; memory as above, and 3 MB of blocks' sums. But 5.0 million pairs

@@ -28,14 +28,22 @@ from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
 from splitnerf.devices import same_bits
 from splitnerf.errors import InputError
-from splitnerf.evaluate.jobs import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
+from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.export.scene import Exported, write_assets
 from splitnerf.files import atomic_path, locked
 from splitnerf.notes import note, note_once
 from splitnerf.plugins import installed
-from splitnerf.refinement.fit import RefinementSettings
-from splitnerf.refinement.job import RECORD, STATE, TRAINED, OtherState, forget_state, refine_folder, refinement_summary
+from splitnerf.refinement.fit import FitSettings
+from splitnerf.refinement.refine import (
+    RECORD,
+    STATE,
+    TRAINED,
+    OtherState,
+    forget_state,
+    refine_folder,
+    refinement_summary,
+)
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
@@ -204,7 +212,7 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, ob
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
     observer(Event("refinement", path=run / TRAINED))
-    settings = RefinementSettings(
+    settings = FitSettings(
         sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
     )
     try:

@@ -10,7 +10,7 @@ from splitnerf.data.frames import refuse_data
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
-from splitnerf.refinement.job import RECORD, STATE, TRAINED
+from splitnerf.refinement.refine import RECORD, STATE, TRAINED
 from splitnerf.training.metrics import METRICS
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32

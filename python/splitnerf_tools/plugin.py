@@ -12,7 +12,7 @@ from splitnerf_tools.commands import ablate, batch, bench, demo, doctor, inspect
 
 if TYPE_CHECKING:
     from splitnerf.data.dataset import Dataset
-    from splitnerf.evaluate.jobs import Evaluated
+    from splitnerf.evaluate.scoring import Evaluated
     from splitnerf.render.model import SceneModel
     from splitnerf.training.observer import Observer
 

@@ -23,7 +23,7 @@ import torch
 from splitnerf.config import parse_setting, preset
 from splitnerf.data.dataset import load_dataset, spread
 from splitnerf.devices import choose_device
-from splitnerf.evaluate.jobs import Protocol, score_fields
+from splitnerf.evaluate.scoring import Protocol, score_fields
 from splitnerf.training.loop import TrainedScene, Training
 from splitnerf.training.metrics import METRICS
 from splitnerf_tools.bench.provenance import header, provenance

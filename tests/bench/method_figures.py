@@ -166,7 +166,7 @@ def occlusion(size: int = 96) -> plt.Figure:
     rays = {"n_diffuse_rays": 512, "n_specular_rays": 512, "offset": 0.0}
     o_d, o_s = ops.occlusion_factors(scene, points, normals, lobe_dirs, rough, torch.ones(8, 16, 3), **rays)
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.2), width_ratios=[1, 1, 1.3])
-    for axis, factor, title in zip(axes, (o_d, o_s), ("$o_d$, from above", "$o_s$, lobe to the right, roughness .4")):
+    for axis, factor, title in zip(axes, (o_d, o_s), ("$o_d$, from above", "$o_s$, lobe to the right, roughness 0.4")):
         axis.imshow(factor.reshape(size, size), cmap="gray", vmin=0, vmax=1, extent=(-2, 2, -2, 2))
         axis.add_patch(plt.Circle((0, 0), 0.5, fill=False, color=GOLD))
         axis.set_title(title, fontsize=10)

@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 from splitnerf.data.images import write_image
-from splitnerf.evaluate.jobs import read_evaluation
+from splitnerf.evaluate.scoring import read_evaluation
 from splitnerf.files import atomic_path
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance

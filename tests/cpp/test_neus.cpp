@@ -232,7 +232,7 @@ TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
   cpu::run(3, CompositeBackwardBody<double>{plain, g.data(), gw.data(), gv.data(), nullptr});
   EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
   EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
-  // Divided by the opacity, at least .5: the second and the third ray count as that, and have no gradient.
+  // Divided by the opacity, at least 0.5: the second and the third ray count as that, and have no gradient.
   const CompositeArrays<double> divided{rays, 2, w.data(), v.data(), opacity.data(), 0.5};
   cpu::run(3, CompositeBody<double>{divided, sums.data()});
   EXPECT_EQ(sums, (std::vector<double>{2.5, 25, 0, 0, 18, 180}));

@@ -13,7 +13,7 @@
 namespace splitnerf {
 namespace {
 
-// Rays of many lengths, among them none, one and just a group's; distances that fall from .1 to below 0, with rises between.
+// Rays of many lengths, among them none, one and just a group's; distances that fall from 0.1 to below 0, with rises between.
 // Behind them are samples of no ray.
 struct Rays {
   std::vector<int64_t> offsets{0};

@@ -82,7 +82,7 @@ def lookup_inputs(dtype=torch.float64, n: int = 18) -> tuple:
 
 def pixel_inputs(n: int = 60, dtype=torch.float64) -> tuple:
     """Colours up to 1.6, some below 0; opacities beyond both bounds of the mask's; some channels clipped by the photo; exposures
-    from .8 to 1.2."""
+    from 0.8 to 1.2."""
     target = rand(n, 4, seed=3)
     target[::7, :2] = 1.0
     parts = 1.7 * rand(n, 3) - 0.1, 1.004 * rand(n, seed=1) - 0.002, target, rand(n, 3, seed=4)

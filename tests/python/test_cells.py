@@ -91,7 +91,7 @@ def test_a_lamp_lights_its_own_cell_alone():
 
 
 def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
-    """Suns anywhere in their cells; without aim the shadow is up to .07 away."""
+    """Suns anywhere in their cells; without aim the shadow is up to 0.07 away."""
     mesh = trimesh.util.concatenate(
         [grid_mesh(3.0, 60), trimesh.creation.icosphere(3, 0.25).apply_translation((0, 0, 0.7))]
     )
@@ -140,7 +140,7 @@ class Field(Light):
 
 
 def floor_and_wall() -> trimesh.Trimesh:
-    """A floor about the origin, and a wall at x = .5 that faces it."""
+    """A floor about the origin, and a wall at x = 0.5 that faces it."""
     floor, wall = grid_mesh(0.4, 8), grid_mesh(3.0, 40)
     wall.apply_transform(trimesh.transformations.rotation_matrix(-math.pi / 2, (0, 1, 0)))
     return trimesh.util.concatenate([floor, wall.apply_translation((0.5, 0, 0))])

@@ -12,10 +12,10 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.relit import map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
-from splitnerf.evaluate.jobs import Protocol, choose_views
 from splitnerf.evaluate.relight import RelitViews, relight_scores, straight_srgb
+from splitnerf.evaluate.score_table import evaluation_table
+from splitnerf.evaluate.scoring import Protocol, choose_views
 from splitnerf.evaluate.similarity import ScaledView, scaled_scores
-from splitnerf.evaluate.table import evaluation_table
 
 SIZE = 16
 

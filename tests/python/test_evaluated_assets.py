@@ -13,8 +13,8 @@ from splitnerf.data.images import linear_to_srgb, over_background, read_image, s
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import sheet
 from splitnerf.evaluate.asset import asset_predictions
-from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
 from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
+from splitnerf.evaluate.scoring import Protocol, evaluate_asset, evaluation_path, is_asset
 from splitnerf.evaluate.sheet import picture_grid, write_sheet
 from splitnerf.export.glb import write_glb
 

@@ -12,7 +12,7 @@ from splitnerf.cli import DONE, main
 from splitnerf.config import preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.evaluate.jobs import read_evaluation
+from splitnerf.evaluate.scoring import read_evaluation
 from splitnerf.training.loop import train
 from splitnerf_tools.demo.scene import build_environment
 

@@ -12,7 +12,7 @@ from painted_ball import photos, textured, with_textures
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
-from splitnerf.refinement.fit import RefinementSettings, Stage
+from splitnerf.refinement.fit import FitSettings, Stage
 from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, unit
 from splitnerf.refinement.texels import AssetTexels
 
@@ -152,7 +152,7 @@ def test_metal_and_a_light_without_a_lamp_say_nothing(ball_over_plate):
 def test_refinement_begins_with_the_compact_lamp(ball_over_plate):
     light = glowing_sky(12.0)
     asset = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light))
-    settings = RefinementSettings(sweeps=1, sweep_share=0.05, pixels=200, directions=4, outline=False)
+    settings = FitSettings(sweeps=1, sweep_share=0.05, pixels=200, directions=4, outline=False)
     data = photos(ball_over_plate, light, n=3, spp=4)
     stage = Stage(data, asset, light, settings)
     assert degrees_from(np.array(stage.lamp.direction), SUN) < 1.0

@@ -14,7 +14,7 @@ from bench.tubes import assemble
 from splitnerf.data.asset import Asset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
-from splitnerf.evaluate.jobs import Protocol, evaluate_asset
+from splitnerf.evaluate.scoring import Protocol, evaluate_asset
 from splitnerf.export.glb import write_glb
 from splitnerf_tools.synth.rendering import SynthSettings, synthesise
 

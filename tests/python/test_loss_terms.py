@@ -194,7 +194,7 @@ def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
 
 
 def test_metals_are_drawn_to_their_sides_and_albedo_is_not(rendered):
-    """Slopes with metallic m, by the weights w: 2 w m; w (1 - 2 m); w (1 - f0 / .4) where that is positive."""
+    """Slopes with metallic m, by the weights w: 2 w m; w (1 - 2 m); w (1 - f0 / 0.4) where that is positive."""
     config, batch, ray, _ = rendered
     albedo = (0.8 * torch.rand(len(ray.shares), 3, generator=generator(6))).requires_grad_()
     w, m, f0 = ray.shares / ray.shares.sum(), ray.points.metallic.detach()[:, 0], albedo.detach().amax(1)

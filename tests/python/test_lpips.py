@@ -76,11 +76,11 @@ def test_a_published_protocol_has_it_or_says_why_not(tmp_path, monkeypatch, caps
     asset, light = next(tmp_path.rglob("asset.glb")), root / "light.hdr"
     command = ["evaluate", str(asset), "--data", str(root), "--env", str(light), "--protocol", "shiny"]
     command += ["--spp", "2", "--views", "1", "--out", str(tmp_path / "scores.json")]
-    monkeypatch.setattr("splitnerf.evaluate.published.job.find_distance", lambda: (lambda image, truth: 0.125, ""))
+    monkeypatch.setattr("splitnerf.evaluate.published.scoring.find_distance", lambda: (lambda image, truth: 0.125, ""))
     assert main(command) == DONE
     printed = capsys.readouterr().out
     assert "novel, LPIPS" in printed and "0.125" in printed and "LPIPS was not" not in printed
-    monkeypatch.setattr("splitnerf.evaluate.published.job.find_distance", lambda: (None, "x.pth is missing"))
+    monkeypatch.setattr("splitnerf.evaluate.published.scoring.find_distance", lambda: (None, "x.pth is missing"))
     assert main(command) == DONE
     printed = capsys.readouterr().out
     assert "note: LPIPS was not computed: x.pth is missing" in printed and "novel, LPIPS" not in printed

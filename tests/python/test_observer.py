@@ -14,7 +14,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.pipeline import load_run, reconstruct
 from splitnerf.progress import Interrupt
-from splitnerf.refinement.job import STATE
+from splitnerf.refinement.refine import STATE
 from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training

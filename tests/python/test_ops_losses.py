@@ -38,7 +38,7 @@ def test_a_clipped_photo_asks_only_for_enough():
 
 
 def test_a_whole_pixel_is_compared_with_what_the_camera_added_up():
-    """A white wall behind a grey object that fills .3 of a pixel: as light, not as sRGB; the mask's alpha says nothing of it."""
+    """A white wall behind a grey object that fills 0.3 of a pixel: as light, not as sRGB; the mask's alpha says nothing of it."""
     mean, opacity, behind = torch.full((1, 3), 0.2), torch.tensor([0.3]), torch.ones(1, 3)
     seen = linear_to_srgb(0.3 * mean + 0.7 * srgb_to_linear(behind))
     whole = torch.ones(1, dtype=torch.bool)

@@ -103,8 +103,8 @@ def test_seed_and_channels(scene):
 
 
 def test_rays_that_start_along_themselves():
-    """Under a plane at .02, offset .05: from off the surface all is open; along the ray only what has left the plane
-    behind, cos > .4, which is 1 - .4^2 of the cosine-weighted sky."""
+    """Under a plane at 0.02, offset 0.05: from off the surface all is open; along the ray only what has left the plane
+    behind, cos > 0.4, which is 1 - 0.4^2 of the cosine-weighted sky."""
     plane = trimesh.Trimesh([[-9, -9, 0.02], [9, -9, 0.02], [9, 9, 0.02], [-9, 9, 0.02]], [[0, 1, 2], [0, 2, 3]])
     up, white = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(4, 8, 3)
     for along_ray, expected in ((False, 1.0), (True, 0.84)):

@@ -18,7 +18,7 @@ def drawn(random: list[float], n_near: int, near: PixelList = RUNS, known: Pixel
 
 
 def test_a_list_is_shared_out_among_its_rays():
-    """Seven rays to seven listed pixels, each its own; two rays to forty pixels: one in each half, at .5 and .99 of it."""
+    """Seven rays to seven listed pixels, each its own; two rays to forty pixels: one in each half, at 0.5 and 0.99 of it."""
     _, _, view, index = drawn([0.0, 0.3, 0.6, 0.9, 0.1, 0.0, 0.999, 0.5, 0.99], 7)
     assert index.tolist() == [1, 2, 7, 33, 34, 35, 36, 10, 39]
     assert view.tolist() == [0, 0, 0, 1, 1, 1, 1, 0, 1]

@@ -147,7 +147,7 @@ def test_where_the_field_is_steeper_than_promised_the_walk_goes_back():
 
 
 def test_a_field_far_steeper_than_promised_costs_few_distances():
-    """2.5 (z + .2), which leaps of f / 1.25 cross: 160 samples lie before it, and each would cost two distances."""
+    """2.5 (z + 0.2), which leaps of f / 1.25 cross: 160 samples lie before it, and each would cost two distances."""
     zeros = torch.zeros(SDF_SPEC.n_entries, SDF_SPEC.n_features, dtype=torch.float64)
     hidden = torch.zeros(2, 3 + SDF_SPEC.n_outputs, dtype=torch.float64)
     hidden[0, 2], hidden[1, 2] = 1.0, -1.0

@@ -21,13 +21,13 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
 from splitnerf.data.tensor_files import read_tensors
 from splitnerf.errors import InputError
-from splitnerf.evaluate.jobs import Protocol, score_asset
+from splitnerf.evaluate.scoring import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement import fit, job
-from splitnerf.refinement.fit import Refinement, RefinementSettings, Stage
-from splitnerf.refinement.job import OtherState, refine_folder
+from splitnerf.refinement.fit import FitSettings, Refinement, Stage
 from splitnerf.refinement.pixels import covered_pixels
+from splitnerf.refinement.refine import OtherState, refine_folder
 from splitnerf_tools.report.sections import refinement_section
 from tiny_runs import train
 
@@ -167,7 +167,9 @@ def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_anot
 
 
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
-@pytest.mark.parametrize("place", ["refinement.job.write_environment", "pipeline.score_run", "pipeline.forget_state"])
+@pytest.mark.parametrize(
+    "place", ["refinement.refine.write_environment", "pipeline.score_run", "pipeline.forget_state"]
+)
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
     run, data, tmp_path, monkeypatch, place, minutes
 ):
@@ -205,7 +207,7 @@ def folder(painted, tmp_path) -> Path:
     return tmp_path
 
 
-QUICK = RefinementSettings(sweeps=4, sweep_share=0.1, pixels=256)
+QUICK = FitSettings(sweeps=4, sweep_share=0.1, pixels=256)
 
 
 def n_pixels(painted) -> int:
@@ -272,7 +274,7 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
         refine_folder(folder, data, folder, QUICK)
     state = (folder / "refinement.pt").read_bytes()
 
-    def refused(match: str, settings: RefinementSettings = QUICK) -> None:
+    def refused(match: str, settings: FitSettings = QUICK) -> None:
         with pytest.raises(OtherState, match=match):
             refine_folder(folder, data, folder, settings, resume=True)
 

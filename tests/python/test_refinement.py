@@ -18,10 +18,10 @@ from splitnerf.errors import InputError
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement import fit as fit_module
-from splitnerf.refinement.fit import Refinement, RefinementSettings, refine, srgb_slope
-from splitnerf.refinement.job import fitting_height
+from splitnerf.refinement.fit import FitSettings, Refinement, refine, srgb_slope
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
+from splitnerf.refinement.refine import fitting_height
 from splitnerf.refinement.texels import AssetTexels, materials_of, patch_width
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
@@ -74,7 +74,7 @@ def test_points_read_what_the_path_tracer_reads(ball):
     inside = np.flatnonzero(many["alpha"].reshape(-1) == 1)
     offsets = np.stack(np.meshgrid(*[(np.arange(32) + 0.5) / 32 - 0.5] * 2), axis=-1).reshape(1, -1, 2)
     origins, directions = pixels.rays(inside, np.repeat(offsets, len(inside), 0))
-    fit = Refinement(data, asset, sky(), RefinementSettings())
+    fit = Refinement(data, asset, sky(), FitSettings())
     triangle, u, v = fit.scene.trace_closest(origins.reshape(-1, 3), directions.reshape(-1, 3))
     samples = texels.sample(triangle, u, v, -directions.reshape(-1, 3))
     values = torch.from_numpy(
@@ -114,7 +114,7 @@ def cornered() -> tuple[Asset, Dataset]:
 def test_light_that_the_asset_hides_and_sends_is_the_path_tracers(cornered):
     """No error is left where all is true; a shade too dark or too bright would leave one."""
     asset, data = cornered
-    fit = Refinement(data, asset, 0.4 * sky(), RefinementSettings(light_step=0.0, pixels=4000))
+    fit = Refinement(data, asset, 0.4 * sky(), FitSettings(light_step=0.0, pixels=4000))
     surface = fit.surface()
     assert abs(np.mean([fit.gather(surface) for _ in range(6)])) < 1.5e-4
 
@@ -132,7 +132,7 @@ def test_a_pixel_knows_the_brightest_around_it_that_the_object_covers():
 def test_errors_are_those_of_srgb_at_the_brightest_pixel_around(painted):
     """A light that is a tenth too bright, and pixels beside others four times as bright."""
     asset, data = painted
-    fit = Refinement(data, asset, 1.1 * sky(), RefinementSettings(light_step=0.0, pixels=4000))
+    fit = Refinement(data, asset, 1.1 * sky(), FitSettings(light_step=0.0, pixels=4000))
     surface = fit.surface()
     fit.pixels.brightest = 4 * fit.pixels.target
     target, tone = (torch.from_numpy(x) for x in (fit.pixels.target, fit.pixels.brightest))
@@ -143,7 +143,7 @@ def test_errors_are_those_of_srgb_at_the_brightest_pixel_around(painted):
 
 def test_each_batch_has_directions_of_its_own(painted):
     asset, data = painted
-    fit = Refinement(data, asset, sky(), RefinementSettings(pixels=64))
+    fit = Refinement(data, asset, sky(), FitSettings(pixels=64))
     _, samples = fit.see()
     texels, shares = fit.texels.rows(samples.footprints), samples.footprints.weights
     colours = []
@@ -173,7 +173,7 @@ def refined(painted):
     start = texels.start.clone()
     start[:, :3], start[:, 3] = 0.35, 0.5
     wrong = texels.asset_with(texels.maps(start))
-    settings = RefinementSettings(sweeps=14, sweep_share=1.0, light_step=0.0, pixels=2000, directions=16, outline=False)
+    settings = FitSettings(sweeps=14, sweep_share=1.0, light_step=0.0, pixels=2000, directions=16, outline=False)
     return wrong, refine(data, wrong, sky(), settings)
 
 
@@ -196,7 +196,7 @@ def test_a_wrong_light_comes_nearer_to_the_true_one(painted, monkeypatch):
     asset, data = painted
     grey = np.full_like(sky(), 0.8)
     monkeypatch.setattr(fit_module, "ANCHOR", 1e4)
-    settings = RefinementSettings(sweeps=8, sweep_share=1.0, pixels=1000, directions=16, outline=False)
+    settings = FitSettings(sweeps=8, sweep_share=1.0, pixels=1000, directions=16, outline=False)
     result = refine(data, asset, grey, settings)
     light, sweeps = result.light, result.sweeps
     cosine = np.sin((np.arange(16) + 0.5) * np.pi / 16)[:, None, None]
@@ -209,7 +209,7 @@ def test_a_wrong_light_comes_nearer_to_the_true_one(painted, monkeypatch):
 def test_saturated_pixels_ask_for_no_less_light(painted):
     asset, data = painted
     white = replace(data, images=np.concatenate([np.ones_like(data.images[..., :3]), data.images[..., 3:]], -1))
-    fit = Refinement(white, asset, 40 * sky(), RefinementSettings(pixels=200))
+    fit = Refinement(white, asset, 40 * sky(), FitSettings(pixels=200))
     assert abs(fit.gather(fit.surface())) < 1e-12
     assert fit.equations.curvature.abs().max() < 1e-12
 
@@ -217,7 +217,7 @@ def test_saturated_pixels_ask_for_no_less_light(painted):
 def test_a_light_that_is_no_number_ends_the_fit(painted, monkeypatch):
     """In the last sweep as in any other: no batch after it would notice."""
     asset, data = painted
-    fit = Refinement(data, asset, sky(), RefinementSettings(sweep_share=0.05, pixels=200))
+    fit = Refinement(data, asset, sky(), FitSettings(sweep_share=0.05, pixels=200))
     add = fit.light_equations.add
     monkeypatch.setattr(fit.light_equations, "add", lambda rows, sky, residual: add(rows, sky, residual * float("nan")))
     with pytest.raises(RuntimeError, match="light after .* is not finite"):
@@ -251,10 +251,10 @@ def test_photos_that_show_nothing_of_the_asset_are_refused(painted):
     asset, data = painted
     elsewhere = replace(asset, vertices=asset.vertices + np.float32([50, 0, 0]))
     with pytest.raises(InputError, match="shows the asset"):
-        refine(data, elsewhere, sky(), RefinementSettings(sweeps=1, pixels=64, outline=False))
+        refine(data, elsewhere, sky(), FitSettings(sweeps=1, pixels=64, outline=False))
     empty = replace(data, images=np.zeros_like(data.images))
     with pytest.raises(InputError, match="no pixel"):
-        refine(empty, asset, sky(), RefinementSettings(sweeps=1, pixels=64))
+        refine(empty, asset, sky(), FitSettings(sweeps=1, pixels=64))
     full = replace(data, images=np.ones_like(data.images))
     assert fit_outline(full, asset) == (asset, [])  # masks without edges say nothing of the outline
 
@@ -279,7 +279,7 @@ def test_the_command_writes_an_asset_and_says_what_is_wrong(tmp_path, capsys, pa
 
 def test_a_sweep_has_no_more_pixels_than_it_may(painted, monkeypatch):
     asset, data = painted
-    fit = Refinement(data, asset, sky(), RefinementSettings(light_step=0.0, pixels=100, sweep_share=1.0))
+    fit = Refinement(data, asset, sky(), FitSettings(light_step=0.0, pixels=100, sweep_share=1.0))
     assert len(fit.pixels) > 600
     monkeypatch.setattr(fit_module, "SWEEP_PIXELS", 300)
     fit.sweep()

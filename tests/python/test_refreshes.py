@@ -70,7 +70,7 @@ def refreshed(data, tmp_path, monkeypatch):
 
 
 def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_first(refreshed):
-    """Every 6 steps, all cells at first and at the end; the hull until .4 of the run, which is step 8."""
+    """Every 6 steps, all cells at first and at the end; the hull until 0.4 of the run, which is step 8."""
     trained, seen = refreshed(grid_every=6, hull_until=0.4)
     assert seen["grid"] == [
         (step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)

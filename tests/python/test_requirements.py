@@ -90,7 +90,7 @@ def test_all_files_name_one_version(project):
 
 
 def test_the_list_of_changes_names_the_formats_of_files():
-    from splitnerf.refinement.job import STATE_FORMAT
+    from splitnerf.refinement.refine import STATE_FORMAT
     from splitnerf.training.checkpoint import FORMAT
 
     table = (ROOT / "CHANGELOG.md").read_text()

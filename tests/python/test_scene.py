@@ -50,7 +50,7 @@ class TestAveragedGrid:
     @pytest.mark.parametrize(("left", "right"), [(0.0, 5.46), (9.4, 10.1), (5.46, 9.4)])
     def test_a_cell_stays_while_its_opacity_exceeds_the_mean_or_a_thousandth(self, left, right):
         """Opacities of a sample across the surface's distance f: 1 - Phi(f - h) / Phi(f + h), of one half of the cells and the
-        other; .63 and .01 both stay, of two below a thousandth the one above the mean."""
+        other; 0.63 and 0.01 both stay, of two below a thousandth the one above the mean."""
         s, step = 200.0, 0.01
         f = torch.tensor([left, right], dtype=torch.float64) / s
         opacity = 1 - torch.sigmoid(s * (f - step / 2)) / torch.sigmoid(s * (f + step / 2))

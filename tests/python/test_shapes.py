@@ -11,7 +11,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths
-from splitnerf.evaluate.jobs import asset_mesh
+from splitnerf.evaluate.scoring import asset_mesh
 from splitnerf_tools.commands import synth as command
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 

@@ -24,7 +24,7 @@ BY_CONDITION = "a few roundings, times how much the true value changes by a rela
 def repaired(rows: Rows) -> Rows:
     """Directions of length 1 or 0, shares in [0, 1], light and densities not below 0.
 
-    Where the normal has length 0 the query has the length chi, which vanishes towards roughness 1: below .9 there.
+    Where the normal has length 0 the query has the length chi, which vanishes towards roughness 1: below 0.9 there.
     """
     out = dict(rows)
     for name, x in rows.items():

@@ -91,7 +91,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     check_usage(args)
-    from splitnerf.evaluate.jobs import read_evaluation
+    from splitnerf.evaluate.scoring import read_evaluation
 
     data = args.data or []
     evaluations = []
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"{target}:")
         print_scores(scores)
     if args.table:
-        from splitnerf.evaluate.table import evaluation_table
+        from splitnerf.evaluate.score_table import evaluation_table
         from splitnerf.files import atomic_path
 
         with atomic_path(args.table) as temporary:
@@ -123,9 +123,9 @@ def check_usage(args: argparse.Namespace) -> None:
     Raises:
         InputError: Two options exclude each other, or a file would be lost; the message names them.
     """
-    from splitnerf.evaluate.jobs import holds_evaluation
-    from splitnerf.evaluate.published.job import holds_published
-    from splitnerf.evaluate.table import holds_table
+    from splitnerf.evaluate.published.scoring import holds_published
+    from splitnerf.evaluate.score_table import holds_table
+    from splitnerf.evaluate.scoring import holds_evaluation
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
     if not args.data and given:
@@ -158,7 +158,7 @@ def check_usage(args: argparse.Namespace) -> None:
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
     """Scores one run or file, writes the requested files, and returns the scores."""
     from splitnerf.data.json_files import write_json
-    from splitnerf.evaluate.jobs import Protocol, evaluate_asset, evaluation_path, is_asset
+    from splitnerf.evaluate.scoring import Protocol, evaluate_asset, evaluation_path, is_asset
     from splitnerf.pipeline import evaluate_run
 
     protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
@@ -182,10 +182,10 @@ def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
     """Scores one run or file by the protocol of a published set, writes the scores, and prints them with published
     ones."""
     from splitnerf.data.json_files import write_json
-    from splitnerf.evaluate.jobs import is_asset
     from splitnerf.evaluate.published.common import Options
-    from splitnerf.evaluate.published.job import published_path, score_published
-    from splitnerf.evaluate.published.table import table
+    from splitnerf.evaluate.published.scoring import published_path, score_published
+    from splitnerf.evaluate.published.values import table
+    from splitnerf.evaluate.scoring import is_asset
 
     if args.env is not None and not is_asset(target):
         raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")

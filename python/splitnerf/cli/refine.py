@@ -40,18 +40,18 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
-    from splitnerf.refinement.fit import RefinementSettings
-    from splitnerf.refinement.job import refine_run
+    from splitnerf.refinement.fit import FitSettings
+    from splitnerf.refinement.refine import refine_run
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
-    sweeps = (UNLIMITED if args.minutes > 0 else RefinementSettings.sweeps) if args.sweeps is None else args.sweeps
+    sweeps = (UNLIMITED if args.minutes > 0 else FitSettings.sweeps) if args.sweeps is None else args.sweeps
     if sweeps < 1:
         raise InputError(f"--sweeps must be at least 1, got {sweeps}")
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
-    settings = RefinementSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
+    settings = FitSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
     refined = refine_run(
         args.run,
         args.data,

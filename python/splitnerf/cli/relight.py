@@ -64,7 +64,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     from splitnerf.data.asset import Asset
     from splitnerf.relight.cameras import View, data_views, parse_size, path_views, turntable
-    from splitnerf.relight.job import Settings, relight
+    from splitnerf.relight.rendering import Settings, relight
 
     check_ranges(args)
     size = parse_size(args.size) if args.size else None

@@ -162,7 +162,7 @@ def train_in(
 ) -> int:
     """Trains in a locked folder, calls the observers, prints the outcome and returns the exit code."""
     from splitnerf.devices import choose_device
-    from splitnerf.evaluate.jobs import read_evaluation
+    from splitnerf.evaluate.scoring import read_evaluation
     from splitnerf.pipeline import reconstruct
     from splitnerf.training.observer import Event, together
 

@@ -18,7 +18,7 @@ OF_RUN = "share of the run"
 
 
 @dataclass(frozen=True)
-class Run:
+class RunSettings:
     """Length, reproducibility and saved state of a run."""
 
     preset: str = setting("cpu", "name of the preset that the settings started from")
@@ -34,7 +34,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Data:
+class DataSettings:
     """Reading of the photos, where the data do not state it."""
 
     eval_mode: str = setting(
@@ -49,7 +49,7 @@ class Data:
 
 
 @dataclass(frozen=True)
-class Exposure:
+class ExposureSettings:
     """Relative exposure of the photos."""
 
     refine: str = setting(
@@ -61,7 +61,7 @@ class Exposure:
 
 
 @dataclass(frozen=True)
-class Separation:
+class SeparationSettings:
     """How the object is found in photos that have no masks."""
 
     share: float = setting(0.15, "share of run.max_minutes for this search", unit=OF_RUN, above=0, below=1)
@@ -69,7 +69,7 @@ class Separation:
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceSettings:
     """The signed distance field: a hash grid whose levels open one by one, and a network of one hidden layer."""
 
     n_levels: int = setting(9, "levels of the hash grid", at_least=1, at_most=32)
@@ -98,7 +98,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Materials:
+class MaterialsSettings:
     """The network of albedo, roughness and metallic."""
 
     inputs: str = setting(
@@ -110,7 +110,7 @@ class Materials:
 
 
 @dataclass(frozen=True)
-class Light:
+class LightSettings:
     """The distant light, as texels or as a network."""
 
     kind: str = setting("pyramid", "how the light is stored; mlp: the paper", choices=("mlp", "pyramid"))
@@ -120,7 +120,7 @@ class Light:
 
 
 @dataclass(frozen=True)
-class Shading:
+class ShadingSettings:
     """The colour of a pixel from material and light."""
 
     method: str = setting(
@@ -146,7 +146,7 @@ class Shading:
 
 
 @dataclass(frozen=True)
-class Occlusion:
+class OcclusionSettings:
     """Occlusion of the light by the object, and interreflection."""
 
     kind: str = setting(
@@ -162,7 +162,7 @@ class Occlusion:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class MeshSettings:
     """The mesh that occlusion is traced on while training."""
 
     every: float = setting(0.1, "time between two meshes", unit=OF_RUN)
@@ -173,7 +173,7 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Sampling:
+class SamplingSettings:
     """Rays, the samples along them, and the grid of cells that holds them."""
 
     max_rays: int = setting(8192, "most rays of a step", unit="rays", at_least=1, at_most=1 << 20)
@@ -195,7 +195,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Losses:
+class LossesSettings:
     """Weights and widths of the loss's terms."""
 
     colour_weight: float = setting(10.0 / 3.0, "weight of the squared error of colours, summed over channels")
@@ -222,7 +222,7 @@ class Losses:
 
 
 @dataclass(frozen=True)
-class Refinement:
+class RefinementSettings:
     """Refinement: the exported asset and its light are fitted to the photos."""
 
     enabled: bool = setting(True, "whether there is a refinement")
@@ -233,7 +233,7 @@ class Refinement:
 
 
 @dataclass(frozen=True)
-class Export:
+class ExportSettings:
     """The files of the finished run."""
 
     resolution: int = setting(

@@ -32,7 +32,7 @@ class OcclusionQuery(NamedTuple):
     roughness: Tensor
 
 
-class Materials(Protocol):
+class MaterialsAt(Protocol):
     """Materials of a surface."""
 
     def __call__(self, positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -50,7 +50,7 @@ class Reflect(Protocol):
 
         Args:
             normals, view_dirs: [n, 3] unit.
-            materials: The values of :class:`Materials` at the points.
+            materials: The values of :class:`MaterialsAt` at the points.
             light_s, light_d: [n, 3] light that arrives, in the normalisation of g(d, rho) and g(n, 1).
         """
 
@@ -194,7 +194,7 @@ class OcclusionModel(nn.Module, abc.ABC):
     def restore_aims(self, cached: dict[str, Tensor | None]) -> None:
         """Restores the directions in which a mesh is traced from :meth:`cached_light`."""
 
-    def refresh(self, light: EvaluatedLight, materials: Materials, reflect: Reflect) -> None:
+    def refresh(self, light: EvaluatedLight, materials: MaterialsAt, reflect: Reflect) -> None:
         """Shades the cached mesh again, if any.
 
         Args:

@@ -16,7 +16,7 @@ from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, LightTexels, lobe_roughness
 from splitnerf.fields.occlusion import (
     Emitters,
-    Materials,
+    MaterialsAt,
     Occlusion,
     OcclusionModel,
     OcclusionQuery,
@@ -219,7 +219,7 @@ class VisibilityBits(OcclusionModel):
         return cached_visibility(self.cache, positions, normals, self.radiance)
 
     @torch.no_grad()
-    def refresh(self, light: EvaluatedLight, materials: Materials, reflect: Reflect) -> None:
+    def refresh(self, light: EvaluatedLight, materials: MaterialsAt, reflect: Reflect) -> None:
         """Shades the emitters again. They receive the radiance of the refresh before, so that each call adds a bounce.
 
         An emitter reflects towards the one direction that it is seen from. Its specular light is the environment's, or

@@ -15,7 +15,7 @@ def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
     The mean over the coarsest level, the brightness of the whole light, costs nothing: it is taken from that level's texels. A
     texel d then costs
 
-    .. math:: \ln\left(1 + \frac{b^2}{3 \cdot .5^2}\right) + \ln\left(1 + \frac{c}{3 \cdot .2^2}\right) ,
+    .. math:: \ln\left(1 + \frac{b^2}{3 \cdot 0.5^2}\right) + \ln\left(1 + \frac{c}{3 \cdot 0.2^2}\right) ,
 
     b the mean of its channels and c that of :math:`(d - b)^2`.
 

@@ -93,7 +93,7 @@ def surface_weights(
     .. math:: \alpha = \max\left(0, \frac{\Phi(f_{prev}) - \Phi(f_{next})}{\Phi(f_{prev})}\right) .
 
     It is computed in log space, as the optical depth :math:`\tau = \ln(1 + (e^a - 1) \Phi(-f_{prev}))`,
-    :math:`a = s \max(0, f_{prev} - f_{next})`; the transmittance is :math:`e^{-\sum \tau}`. A field gradient shorter than .001 gets
+    :math:`a = s \max(0, f_{prev} - f_{next})`; the transmittance is :math:`e^{-\sum \tau}`. A field gradient shorter than 0.001 gets
     no gradient in the backward pass.
 
     Args:

@@ -44,7 +44,7 @@ def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: 
     .. math::
 
        d &= \mathrm{normalize}((1 - k)\, n + k\, w_r) \\
-       k &= \mathrm{lerp}(1,\ \chi(n \cdot v, \rho),\ \mathrm{smoothstep}(.3, .4, \rho))
+       k &= \mathrm{lerp}(1,\ \chi(n \cdot v, \rho),\ \mathrm{smoothstep}(0.3, 0.4, \rho))
 
     with the mirror direction :math:`w_r` and :math:`\chi` from :func:`brdf_lut`. A normal that faces away from the viewer is
     negated first.
@@ -104,9 +104,9 @@ def split_sum_shade(
         diffuse: [n, 3] radiance g(n, 1), or None.
         occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
         fresnel_mode: The form of the Fresnel term: ``exact`` (above), ``paper`` or ``code``. The last two mix the
-            materials' reflectances, ``F0 = .04 (1 - m) + m albedo``, and apply the term twice, as published.
+            materials' reflectances, ``F0 = 0.04 (1 - m) + m albedo``, and apply the term twice, as published.
         compensate: Whether to compensate for multiple scattering: each lobe's ``E [1 + F0 (1/(F1 + F2) - 1)]`` with F0
-            the albedo of the metal and .04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
+            the albedo of the metal and 0.04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
         indirect_s, indirect_d: [n, 3] light i_s and i_d >= 0 that the object itself sends to the points, in the
             normalisation of g, or None for none; no gradient.
 

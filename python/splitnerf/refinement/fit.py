@@ -64,7 +64,7 @@ MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
 @dataclass(frozen=True)
-class RefinementSettings:
+class FitSettings:
     """What the fit does.
 
     Attributes:
@@ -157,7 +157,7 @@ class Refinement:
         settings: What the fit does.
     """
 
-    def __init__(self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: RefinementSettings):
+    def __init__(self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: FitSettings):
         s = self.settings = settings
         self.pixels, self.filter = covered_pixels(dataset), PixelFilter()
         if len(self.pixels) == 0:
@@ -383,7 +383,7 @@ class Stage:
         dataset: Dataset,
         asset: Asset,
         environment: np.ndarray,
-        settings: RefinementSettings,
+        settings: FitSettings,
         state: dict | None = None,
         show: Callable[[float, str], None] = lambda share, message: None,
     ):
@@ -477,7 +477,7 @@ def refine(
     dataset: Dataset,
     asset: Asset,
     environment: np.ndarray,
-    settings: RefinementSettings,
+    settings: FitSettings,
     report: Callable[[Sweep], None] = lambda sweep: None,
 ) -> Refined:
     """Fits an asset's outline, its textures and the light to photos; see :class:`Refinement` for the arguments.

@@ -134,7 +134,7 @@ class AssetTexels:
         return SurfaceSamples(*tensors, bilinear_footprints(mean(a.uv), self.size))
 
 
-class Materials(NamedTuple):
+class TexelMaterials(NamedTuple):
     """Materials of points: albedo [n, 3], roughness and metallic [n, 1], unit shading normals [n, 3] that face the
     viewer."""
 
@@ -144,7 +144,7 @@ class Materials(NamedTuple):
     normals: Tensor
 
 
-def materials_of(values: Tensor, samples: SurfaceSamples) -> Materials:
+def materials_of(values: Tensor, samples: SurfaceSamples) -> TexelMaterials:
     """The materials of samples from texture values [n, 8] at them."""
     albedo, roughness, metallic, local = values.split([3, 1, 1, 3], dim=1)
     x, y, z = local.unbind(1)
@@ -156,7 +156,7 @@ def materials_of(values: Tensor, samples: SurfaceSamples) -> Materials:
     cosine = (normals * samples.view_dirs).sum(1, keepdim=True)
     across = F.normalize(normals - samples.view_dirs * cosine, dim=1)
     bent = F.normalize(across + samples.view_dirs * MIN_COSINE, dim=1)
-    return Materials(albedo, roughness, metallic, torch.where(cosine >= MIN_COSINE, normals, bent))
+    return TexelMaterials(albedo, roughness, metallic, torch.where(cosine >= MIN_COSINE, normals, bent))
 
 
 def check_form(asset: Asset) -> None:

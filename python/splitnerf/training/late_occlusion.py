@@ -20,7 +20,7 @@ from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.losses import OcclusionPoints, occlusion_error, occlusion_points, traced_factors
 
 
-class Lesson(NamedTuple):
+class PendingTargets(NamedTuple):
     """What an earlier step left, on the model's device.
 
     Attributes:
@@ -54,8 +54,8 @@ class LateOcclusion:
 
     def __init__(self, model: SceneModel, generator: torch.Generator):
         self.model, self.generator = model, generator
-        self._asked: Lesson | None = None
-        self._known: tuple[Lesson, tuple[Tensor, Tensor]] | None = None
+        self._asked: PendingTargets | None = None
+        self._known: tuple[PendingTargets, tuple[Tensor, Tensor]] | None = None
 
     def loss(self, ray: RenderedRays, scene: MeshScene, environment: Tensor, seed: int) -> Tensor | None:
         """The loss [] at the newest traced points; None before there are any.
@@ -84,7 +84,7 @@ class LateOcclusion:
             self._asked = None
 
     @torch.no_grad()
-    def _ask(self, ray: RenderedRays, scene: MeshScene, environment: Tensor, seed: int) -> Lesson | None:
+    def _ask(self, ray: RenderedRays, scene: MeshScene, environment: Tensor, seed: int) -> PendingTargets | None:
         c = self.model.config
         chosen = one_of_each_run(len(ray.shaded), c.constants.occlusion_share, self.generator)
         if len(chosen) == 0:
@@ -94,12 +94,12 @@ class LateOcclusion:
         numbers, wait = start_fetching(torch.cat([x.flatten() for x in packed]))  # one copy
         shapes = [x.shape for x in packed]
         truth = in_background(trace, numbers, wait, shapes, self.model.device, scene, c, seed)
-        return Lesson(ray.positions[chosen], points, ray.shares[chosen], truth)
+        return PendingTargets(ray.positions[chosen], points, ray.shares[chosen], truth)
 
-    def _compare(self, lesson: Lesson, truth: tuple[Tensor, Tensor]) -> Tensor:
-        inputs = self.model.head_inputs(lesson.positions, *self.model.sdf_field(lesson.positions))
-        predicted = self.model.occlusion(OcclusionQuery(inputs, *lesson.points))
-        return occlusion_error((predicted.diffuse, predicted.specular), truth, lesson.shares, self.model.config)
+    def _compare(self, pending: PendingTargets, truth: tuple[Tensor, Tensor]) -> Tensor:
+        inputs = self.model.head_inputs(pending.positions, *self.model.sdf_field(pending.positions))
+        predicted = self.model.occlusion(OcclusionQuery(inputs, *pending.points))
+        return occlusion_error((predicted.diffuse, predicted.specular), truth, pending.shares, self.model.config)
 
 
 def trace(

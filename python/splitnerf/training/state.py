@@ -13,7 +13,7 @@ from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.devices import let_segments_grow, same_bits
 from splitnerf.fields import EvaluatedLight
 from splitnerf.notes import note_once
-from splitnerf.refinement.job import STATE
+from splitnerf.refinement.refine import STATE
 from splitnerf.render.averages import training_photos
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import make_grid, visual_hull

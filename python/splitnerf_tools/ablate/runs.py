@@ -10,7 +10,7 @@ from pathlib import Path
 from splitnerf.config import Config
 from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
-from splitnerf.evaluate.jobs import Protocol
+from splitnerf.evaluate.scoring import Protocol
 from splitnerf.pipeline import evaluate_run, reconstruct
 
 from splitnerf_tools.ablate.rows import Row

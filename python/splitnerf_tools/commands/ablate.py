@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("give at least one DATA folder, or --list")
 
     from splitnerf.data.frames import refuse_data
-    from splitnerf.evaluate.jobs import Protocol
+    from splitnerf.evaluate.scoring import Protocol
     from splitnerf.files import atomic_path, locked
 
     from splitnerf_tools.ablate.runs import AblationPlan, Interrupted, ablate

@@ -50,7 +50,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes"
     )
     parser.add_argument(
-        "--gpus-per-scene", type=float, metavar="N", help="default: .25 where there are GPUs; preset paper: 1"
+        "--gpus-per-scene", type=float, metavar="N", help="default: 0.25 where there are GPUs; preset paper: 1"
     )
     parser.add_argument(
         "--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it"

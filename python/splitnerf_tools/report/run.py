@@ -13,11 +13,11 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background
 from splitnerf.data.truth import load_scene_truth
 from splitnerf.evaluate.asset import asset_predictions
-from splitnerf.evaluate.jobs import Evaluated
+from splitnerf.evaluate.scoring import Evaluated
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.pipeline import REPORT_VIEWS
-from splitnerf.refinement.job import TRAINED
+from splitnerf.refinement.refine import TRAINED
 from splitnerf.render.model import SceneModel
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.run_folder import ASSET_FILES, is_refined

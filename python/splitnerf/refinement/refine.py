@@ -28,7 +28,7 @@ from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.files import locked
 from splitnerf.progress import Interrupt, Progress
-from splitnerf.refinement.fit import Refined, RefinementSettings, Stage, decibels
+from splitnerf.refinement.fit import FitSettings, Refined, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
@@ -123,7 +123,7 @@ class StateFile:
             self.save()
 
 
-def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> str:
+def origin_of(source: Path, dataset: Dataset, settings: FitSettings) -> str:
     """A hash of all that decides the bits of a sweep: the asset, its light, the photos and the settings."""
     fixed = dataclasses.replace(settings, sweeps=1, minutes=0.0)  # these say only when it ends
     digest = hashlib.sha256(f"{fixed} {dataset_fingerprint(dataset)}".encode())
@@ -133,13 +133,7 @@ def origin_of(source: Path, dataset: Dataset, settings: RefinementSettings) -> s
 
 
 def refine_folder(
-    source: Path,
-    dataset: Dataset,
-    out: Path,
-    settings: RefinementSettings,
-    *,
-    resume: bool = False,
-    save_minutes: float = 2.0,
+    source: Path, dataset: Dataset, out: Path, settings: FitSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
     """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the
     sweep. While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
@@ -206,7 +200,7 @@ def begin(
     dataset: Dataset,
     asset: Asset,
     light: np.ndarray,
-    settings: RefinementSettings,
+    settings: FitSettings,
     state: dict | None,
     path: Path,
     show: Callable[[float, str], None],
@@ -256,7 +250,7 @@ def refine_run(
     out: Path,
     *,
     downscale: int,
-    settings: RefinementSettings,
+    settings: FitSettings,
     resume: bool = False,
     reading: Reading = Reading(),
 ) -> Refined | None:

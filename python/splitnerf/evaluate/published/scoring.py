@@ -12,10 +12,10 @@ from splitnerf.data.json_files import read_json
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.evaluate.asset import environment_beside
-from splitnerf.evaluate.jobs import is_asset
 from splitnerf.evaluate.lpips import find_distance
 from splitnerf.evaluate.published.common import Delivered, Options
-from splitnerf.evaluate.published.table import PROTOCOLS, published
+from splitnerf.evaluate.published.values import PROTOCOLS, published
+from splitnerf.evaluate.scoring import is_asset
 
 
 def score_published(target: Path, data: Path, name: str, options: Options, env: Path | None = None) -> dict:
@@ -24,7 +24,7 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
     Args:
         target: The run or the file, in the data's world frame.
         data: The folder that was trained on.
-        name: One of :data:`splitnerf.evaluate.published.table.PROTOCOLS`.
+        name: One of :data:`splitnerf.evaluate.published.values.PROTOCOLS`.
         options: Paths a pixel, and the folders of lights and truth.
         env: The light of the photos for novel views; None for the environment.exr or .hdr in its folder.
 

@@ -23,7 +23,7 @@ from splitnerf.evaluate.exposure import exposed_like
 from splitnerf.evaluate.lpips import load_distance
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
-from splitnerf.evaluate.table import COLUMNS, GROUPS, SCORES
+from splitnerf.evaluate.score_table import COLUMNS, GROUPS, SCORES
 from splitnerf.progress import tracked
 from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
