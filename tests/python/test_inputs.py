@@ -381,3 +381,30 @@ def test_a_world_that_hangs_is_said(tmp_path):
         )
     finding = {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"]
     assert finding.value == "(0.00, 0.00, -1.00)" and "turn the data's world" in finding.advice
+
+
+def test_keys_that_are_not_used_are_named(tmp_path, capsys):
+    make_blender(tmp_path, train=6, test=2)
+    load_dataset(tmp_path)
+    assert "not used" not in capsys.readouterr().err
+    edit(tmp_path, lambda meta: meta.update(applied_scale=0.5, aabb_scale=4))
+    edit(tmp_path, lambda meta: meta["frames"][2].update(depth_file_path="d.png", rotation=0.1))
+    load_dataset(tmp_path)
+    assert "keys that are not used: aabb_scale, applied_scale, depth_file_path" in capsys.readouterr().err
+
+
+def test_other_primaries_are_named(tmp_path, capsys):
+    spec = oiio.ImageSpec(4, 4, 3, "float")
+    for name, primaries in (
+        ("same", (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)),
+        ("p3", (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)),
+    ):
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), primaries)
+        sink = oiio.ImageOutput.create("x.exr")
+        assert (
+            sink.open(str(tmp_path / f"{name}.exr"), spec)
+            and sink.write_image(np.ones((4, 4, 3), np.float32))
+            and sink.close()
+        )
+        read_radiance(tmp_path / f"{name}.exr")
+        assert ("chromaticities of images are not used" in capsys.readouterr().err) == (name == "p3")

@@ -32,6 +32,7 @@ HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
 STORED = {"uint8": 8, "uint16": 16}  # bits of the values of files that are read as they are
+REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # x, y of red, green, blue and white
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
 
@@ -299,6 +300,12 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
             note_once(f"{path.parent}: channels of images are not used: {others}", path.name)
         top, left, height, width = _window(source, spec)
         exposure = _exposure(path) if source.format_name() == "hdr" else 1.0
+        primaries = spec.getattribute("chromaticities")
+        if primaries is not None and np.abs(np.asarray(primaries) - REC709).max() > 0.01:
+            note_once(
+                f"{path.parent}: the chromaticities of images are not used; their values count as sRGB's primaries",
+                path.name,
+            )
     pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
     pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
     if (top, left, height, width) != (0, 0, *pixels.shape[:2]):

@@ -18,6 +18,7 @@ from splitnerf_tools.capture.photographs import Photograph
 
 LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
 MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
+BLOCK = 8  # photos whose matches are written at once, so that the progress moves
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
 MIN_PHOTOS = 3
@@ -128,7 +129,9 @@ def reconstruct(
             )
         if n <= EXHAUSTIVE:
             with _counted(database, "two_view_geometries", n * (n - 1) // 2, lambda share: report("matches", share)):
-                pycolmap.match_exhaustive(database)
+                pairing = pycolmap.ExhaustivePairingOptions()
+                pairing.block_size = BLOCK
+                pycolmap.match_exhaustive(database, pairing_options=pairing)
         else:
             pairing = pycolmap.SequentialPairingOptions()
             pairing.overlap, pairing.quadratic_overlap = OVERLAP, True

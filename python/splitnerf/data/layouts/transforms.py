@@ -41,6 +41,18 @@ LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL
 SMALLEST_EXPOSURE = 1e-4
 LARGEST_GAMMA = 5.0
 OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter")  # of instant-ngp
+# Keys that are used, or say nothing of pictures or cameras.
+OF_BOTH = {*FOCAL, *LENS, *OTHER_LENSES, "mask_kind", "gamma"}
+OF_FILE = OF_BOTH | {"frames", "train_filenames", "test_filenames", "val_filenames"}
+OF_FRAME = OF_BOTH | {
+    "file_path",
+    "transform_matrix",
+    "mask_path",
+    "exposure",
+    "rotation",
+    "sharpness",
+    "colmap_im_id",
+}  # the last three: a number of Blender's script, and two of instant-ngp's and nerfstudio's
 
 
 def present(root: Path) -> bool:
@@ -128,6 +140,7 @@ def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
 def _frames(path: Path, split: str | None) -> list[Frame]:
     """The frames of a file; of a single file those that are of the split."""
     meta, entries = read_entries(path)
+    _name_unused(meta, entries, path)
     chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split)
     frames = [
         read_frame(entry, meta, i, path)
@@ -137,6 +150,13 @@ def _frames(path: Path, split: str | None) -> list[Frame]:
     if not frames:
         raise InputError(f"{path}: has no frames for the {split} split; add posed images")
     return frames
+
+
+def _name_unused(meta: dict, entries: list[dict], path: Path) -> None:
+    """Notes which keys of a file say something that is not used."""
+    unused = sorted(({*meta} - OF_FILE) | (set().union(*entries) - OF_FRAME))
+    if unused:
+        note_once(f"{path}: keys that are not used: {', '.join(key[:40] for key in unused[:10])}")
 
 
 def read_entries(path: Path) -> tuple[dict, list[dict]]:
