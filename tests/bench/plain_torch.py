@@ -34,6 +34,7 @@ from splitnerf.pipeline import load_run, load_splits
 from splitnerf.render.rays import PixelSource
 from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training import loop as training
+from splitnerf.training import state
 from splitnerf.training.meshes import SurfaceMesh
 from torch import Tensor
 
@@ -126,7 +127,7 @@ def use_plain_torch() -> None:
         module.lib = Plain(module.lib, **functions)
     SdfField.sample = sample
     SdfField.sdf = lambda field, x: field_outputs(field, x)[0][:, 0]
-    make = training.make_optimiser
+    make = state.make_optimiser
 
     def unfused(model, config):
         groups = make(model, config).param_groups
@@ -134,7 +135,7 @@ def use_plain_torch() -> None:
             [{k: g[k] for k in ("params", "lr", "weight_decay", "rate")} for g in groups], betas=(0.9, 0.99), eps=1e-15
         )
 
-    training.make_optimiser = unfused
+    state.make_optimiser = unfused
 
 
 UNSKIPPED = dict(**{"sampling.min_weight": 0.0}, shades_per_ray=0, light_step_every=1)

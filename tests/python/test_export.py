@@ -92,7 +92,7 @@ def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     occlusion = np.random.default_rng(1).random((8, 8)).astype(np.float32)
     write_glb(tmp_path / "a.glb", asset, occlusion)
     document, arrays, binary = parse_glb(tmp_path / "a.glb")
-    to_file = lambda v: v[:, [0, 2, 1]] * [1, 1, -1]  # noqa: E731: +z in the world is +y in the file
+    to_file = lambda v: v[:, [0, 2, 1]] * [1, 1, -1]  # noqa: E731 - +z in the world is +y in the file
     assert arrays["POSITION"] == pytest.approx(to_file(asset.vertices), abs=1e-6)
     assert arrays["NORMAL"] == pytest.approx(to_file(asset.normals), abs=1e-6)
     assert arrays["TANGENT"][:, :3] == pytest.approx(to_file(asset.tangents[:, :3]), abs=1e-6)
@@ -173,7 +173,7 @@ def test_bad_assets_write_nothing(tmp_path, asset, write):
     assert not list(tmp_path.iterdir())
 
 
-CAMERAS = Cameras(torch.eye(4)[None], torch.tensor([[8.0, 8, 8, 8]]), torch.tensor([16, 16]))
+CAMERAS = Cameras(torch.eye(4)[None], torch.tensor([[8.0, 8, 8, 8]]), torch.tensor([[16, 16]]))
 
 
 @pytest.mark.parametrize("flip", [False, True])

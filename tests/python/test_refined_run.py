@@ -24,7 +24,8 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement import fit, job
+from splitnerf.refinement import fit
+from splitnerf.refinement import refine as refinement_files
 from splitnerf.refinement.fit import FitSettings, Refinement, Stage
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.refinement.refine import OtherState, refine_folder
@@ -247,7 +248,7 @@ def test_a_stage_goes_on_from_each_of_its_states(painted, folder, monkeypatch, s
 
 
 def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
-    monkeypatch.setattr(job, "Stage", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(refinement_files, "Stage", lambda *_: signal.raise_signal(signal.SIGINT))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background may ignore it
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -258,7 +259,7 @@ def test_a_signal_ends_the_preparations(painted, folder, monkeypatch):
 
 def test_the_state_is_kept_from_time_to_time(painted, folder, monkeypatch):
     saved = []
-    monkeypatch.setattr(job, "write_tensors", lambda path, content: saved.append(len(content["sweeps"])))
+    monkeypatch.setattr(refinement_files, "write_tensors", lambda path, content: saved.append(len(content["sweeps"])))
     refine_folder(folder, painted[1], folder, QUICK, save_minutes=1e-9)
     assert saved == [1, 2, 3, 4, 4]
     saved.clear()

@@ -15,7 +15,7 @@ from splitnerf.data.environment import rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, read_image, write_image
 from splitnerf.errors import InputError
-from splitnerf.relight import job
+from splitnerf.relight import rendering
 from splitnerf.relight.background import Background, compose, environment_behind, fill
 from splitnerf.relight.cameras import HALF_FIELD, MARGIN, View, bounding_sphere, look_at, path_views, turntable
 from splitnerf.relight.output import display_frame, straight_srgb
@@ -268,12 +268,12 @@ def test_the_cameras_of_a_data_set_at_its_size(tmp_path, ball, grey):
 
 
 def test_an_interrupted_call_leaves_whole_frames_only(tmp_path, ball, grey, monkeypatch, capsys):
-    def interrupt(folder, index, linear, *, with_alpha, write=job.write_frame):
+    def interrupt(folder, index, linear, *, with_alpha, write=rendering.write_frame):
         if index == 1:
             raise KeyboardInterrupt
         write(folder, index, linear, with_alpha=with_alpha)
 
-    monkeypatch.setattr(job, "write_frame", interrupt)
+    monkeypatch.setattr(rendering, "write_frame", interrupt)
     words = ("--env", grey, "--size", "8", "--spp", "1", "--turntable", "3", "--gif", "--out", tmp_path / "out")
     assert run(ball, *words) == INTERRUPTED
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["000.exr", "000.png"]

@@ -54,6 +54,15 @@ def test_a_photo_shows_what_lies_in_its_frame():
         assert found[top & visible].all() and not found[top & hidden].any()
 
 
+def test_each_photo_has_a_frame_of_its_own():
+    mesh = sphere(0.5)
+    half, whole = from_above(size=(100, 51)), from_above()
+    for first, second in ((half, whole), (whole, half)):
+        both = Cameras(*(torch.cat(parts) for parts in zip(first, second)))
+        assert np.array_equal(seen(mesh, both), seen(mesh, whole))
+    assert seen(mesh, half).sum() < 0.7 * seen(mesh, whole).sum()
+
+
 def test_what_another_body_hides_is_not_seen():
     hidden, roof = sphere(0.3, -0.5), sphere(0.6, 0.5)
     found = seen(hidden + roof, from_above())

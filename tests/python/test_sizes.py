@@ -177,3 +177,16 @@ def test_a_lens_is_scaled_with_its_photo(square, tmp_path):
     assert load_dataset(halved).intrinsics == pytest.approx(expected)
     views = data_views(halved, "train", None)
     assert np.array([view.intrinsics for view in views]) == pytest.approx(expected[:, :]) and views[0].width == SIZE
+
+
+def test_small_and_large_photos_agree_where_the_object_is(tmp_path):
+    """Large photos are looked at in averages: each by its own factor."""
+    data = make_blender(tmp_path, centre=(3, 1, -2), train=8)
+    expected = load_dataset(data)
+    for i in (1, 4, 6):
+        path = data / f"train/r_{i}.png"
+        write_image(path, read_image(path).repeat(5, 0).repeat(5, 1))
+    found = load_dataset(data)
+    assert found.sizes[:3].tolist() == [[SIZE] * 2, [5 * SIZE] * 2, [SIZE] * 2]
+    assert found.intrinsics[1] == pytest.approx(5 * expected.intrinsics[1])
+    assert found.box_from_world == pytest.approx(expected.box_from_world, rel=0.03)
