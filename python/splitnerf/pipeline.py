@@ -99,6 +99,7 @@ def reconstruct(
     with locked(run):
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
+        config = for_turntable(config) if dataset.light_turns is not None else config
         training = Training(dataset, config, run, torch.device(device), observer)
         training.begin(resume)
         begin_run(run, config, dataset, overwrite)
@@ -110,6 +111,17 @@ def reconstruct(
             dataset = dataset.exposed(trained.exposures)
             write_exposures(run, dataset)
         return trained, deliver(trained, dataset, test, run, resume=resume, observer=observer)
+
+
+def for_turntable(config: Config) -> Config:
+    """The settings with those that a light of another rotation in each photo needs.
+
+    Raises:
+        InputError: They hold an occlusion that knows one light alone.
+    """
+    if config.occlusion.kind == "mlp":
+        raise InputError("photos of a turntable need occlusion.kind = bits or off; change --set or --preset")
+    return config.replace({"shading.method": "split", "run.cuda_graphs": False})
 
 
 def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> None:
@@ -283,6 +295,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
     model.open_levels(progress_of(config, content["step"], content["seconds"]))
+    model.use_turns(content.get("light_turns"))
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)
     if config.sampling.occupancy == "average":  # averages over the training cannot be recomputed

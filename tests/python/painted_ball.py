@@ -10,6 +10,7 @@ import torch
 import trimesh
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export.unwrap import unwrap
@@ -77,13 +78,16 @@ def looking(azimuth: float, elevation: float, distance: float = 3.4) -> np.ndarr
     return pose.astype(np.float32)
 
 
-def photos(asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128) -> Dataset:
-    """The asset seen from all around, as photos."""
+def photos(
+    asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128, turns: np.ndarray | None = None
+) -> Dataset:
+    """The asset seen from all around, as photos; with `turns` [n, 3, 3] under a light that is turned in each."""
     renderer = AssetRenderer(asset)
     poses = np.stack([looking(2.4 * i, np.arcsin(1.6 * (i + 0.5) / n - 0.8)) for i in range(n)])
     lens, images = (FOCAL, FOCAL, PHOTO / 2, PHOTO / 2), []
     for i, pose in enumerate(poses):
-        maps = renderer.render(environment, pose, lens, PHOTO, PHOTO, spp=spp, seed=i)
+        light = environment if turns is None else turn_environment(environment, turns[i])
+        maps = renderer.render(light, pose, lens, PHOTO, PHOTO, spp=spp, seed=i)
         straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-6)[..., None]
         images.append(np.dstack([linear_to_srgb(straight).clip(0, 1), maps["alpha"]]))
     return Dataset(
@@ -97,6 +101,7 @@ def photos(asset: Asset, environment: np.ndarray, n: int = 10, spp: int = 128) -
         [str(i) for i in range(n)],
         [Path(str(i)) for i in range(n)],
         np.eye(4),
+        light_turns=turns,
     )
 
 

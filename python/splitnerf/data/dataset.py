@@ -63,6 +63,8 @@ class Dataset:
             one of `exposures`.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
+        light_turns: [n, 3, 3] float32, the rotations that carry directions of the internal frame to those in which the light
+            stands still; None where it stands still in the internal frame. On a turntable each photo has its own.
         masked: Whether alpha says where the object is; otherwise it is 1.
         whole: Whether the colours are those of the whole photos, also where alpha is less than 1.
     """
@@ -83,6 +85,7 @@ class Dataset:
     exposures: np.ndarray | None = None
     stated: np.ndarray | None = None
     surroundings: np.ndarray | None = None
+    light_turns: np.ndarray | None = None
     masked: bool = True
     whole: bool = False
 
@@ -193,6 +196,7 @@ class Dataset:
             images=self.images.select(views),
             known=None if self.known is None else self.known[views],
             sizes=self.sizes[views],
+            light_turns=None if self.light_turns is None else self.light_turns[views],
             poses=self.poses[views],
             intrinsics=self.intrinsics[views],
             exposures=self.exposures[views],
@@ -274,6 +278,7 @@ def load_dataset(
         exposures=loader.exposures,
         stated=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
+        light_turns=_light_turns(frames),
         masked=_has_masks(photos),
         whole=all(photo.whole for photo in photos),
     )
@@ -284,6 +289,14 @@ def _surroundings(root: Path, reading: Reading) -> np.ndarray | None:
     folders = [root] if reading.separated is None else [root, reading.separated]
     path = next((folder / SURROUNDINGS for folder in folders if (folder / SURROUNDINGS).is_file()), None)
     return None if path is None else read_surroundings(path)
+
+
+def _light_turns(frames: list[Frame]) -> np.ndarray | None:
+    """The rotations of the photos' lights; those that state none have the identity."""
+    if all(frame.light_turn is None for frame in frames):
+        return None
+    turns = [np.eye(3) if frame.light_turn is None else frame.light_turn for frame in frames]
+    return np.stack(turns).astype(np.float32)
 
 
 def dataset_fingerprint(dataset: Dataset) -> str:
@@ -298,6 +311,7 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())
     shares = [] if dataset.known is None else [dataset.known.mean(axis=(1, 2))]
+    shares += [] if dataset.light_turns is None else [dataset.light_turns]
     step = max(1, min(dataset.height, dataset.width) // MEAN_EDGE)
     means = np.stack([dataset.images[i, ::step, ::step].mean(axis=(0, 1)) for i in range(len(dataset))])
     for values in (dataset.poses, dataset.intrinsics, means, *shares):

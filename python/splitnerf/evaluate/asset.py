@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import turn_environment
 from splitnerf.evaluate.relight import render_view, straight_srgb
 from splitnerf.progress import tracked
 from splitnerf.render.path_traced import AssetRenderer
@@ -38,6 +39,7 @@ def asset_predictions(
     predictions = []
     for index in tracked(range(len(dataset)), "path tracing, view"):
         light = np.ones((2, 4, 3), np.float32) if environment is None else environment
+        light = light if dataset.light_turns is None else turn_environment(light, dataset.light_turns[index])
         maps = render_view(renderer, dataset, index, light, spp)
         prediction = {key: maps[key] for key in ("alpha", "albedo", "roughness", "metallic")}
         for key, kept in (("normal", "smooth_normal"), ("shading_normal", "normal")):

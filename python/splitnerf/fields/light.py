@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import torch
@@ -127,6 +127,23 @@ class EvaluatedLight:
     def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
         """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
         return self.maps(directions, roughness)
+
+    def turned(self, turns: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
+        """The light of n points of its own frame each: called as the light is, with directions [m n, 3] of the points' world.
+
+        Args:
+            turns: [n, 3, 3] rotations from the points' world to the light's frame.
+        """
+
+        def look_up(directions: Tensor, roughness: Tensor) -> Tensor:
+            of_points = directions.view(len(directions) // max(1, len(turns)), len(turns), 3, 1)
+            return self((turns @ of_points).view(-1, 3), roughness)
+
+        return look_up
+
+    def mean_over(self, turns: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
+        """The mean light of a world that was rotated by each of `turns` [k, 3, 3] in turn; called as the light is."""
+        return lambda directions, roughness: sum(self(directions @ turn.T, roughness) for turn in turns) / len(turns)
 
     @property
     def leaves(self) -> tuple[Tensor, ...]:

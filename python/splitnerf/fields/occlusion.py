@@ -134,10 +134,13 @@ class OcclusionModel(nn.Module, abc.ABC):
         needs_mesh: Whether the factors of this kind depend on meshes.
         ready: Whether a mesh is in use.
         is_unoccluded: Whether the mesh in use counts as convex: all factors are 1 without a lookup.
+        turns: [m, 3, 3] rotations from the mesh's world to the light's, over which the light that weighs the factors is
+            averaged: that of a turntable is another one in each photo. None: the light stands still.
     """
 
     needs_mesh = True
     is_unoccluded = False
+    turns: Tensor | None = None
 
     def __init__(self, n_channels: int):
         super().__init__()

@@ -114,6 +114,9 @@ class VisibilityBits(OcclusionModel):
     @torch.no_grad()
     def aim(self, light: EvaluatedLight) -> None:
         """Aims each cell's direction at its light, so that a lamp's shadow falls where the lamp stands."""
+        if self.turns is not None:
+            self.aims = self.centres.clone()
+            return
         texels = light.maps.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
         power = texels.radiance.sum(1, keepdim=True) * texels.solid_angles[:, None]
         cell = self._cells_of(texels).cell
@@ -186,8 +189,17 @@ class VisibilityBits(OcclusionModel):
         """The light's mean over each direction's cell, differentiable in the light. A texel belongs to one cell, so
         that the cells have the power of the light."""
         texels = light.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
+        if self.turns is not None:
+            texels = texels._replace(
+                radiance=EvaluatedLight(light).mean_over(self.turns)(texels.directions, self._blur(texels))
+            )
         cells = self._cells_of(texels)
         return CellLight(sparse_product(cells.means, texels.radiance), self.directions, cells.solid_angles)
+
+    @staticmethod
+    def _blur(texels: LightTexels) -> Tensor:
+        """[t, 1] the roughness whose lobe has a texel's solid angle."""
+        return torch.full_like(texels.solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(texels.directions)))
 
     @torch.no_grad()
     def _cells_of(self, texels: LightTexels) -> Cells:
@@ -227,6 +239,7 @@ class VisibilityBits(OcclusionModel):
         """
         if self.emitters is None or self.is_unoccluded:
             return
+        light = light if self.turns is None else light.mean_over(self.turns)
         x, n, chunk = self.cache.vertices, self.cache.normals, SHADED_CHUNK[self.light.device.type]
         at_vertices = [torch.cat(parts) for parts in zip(*map(materials, x.split(chunk)))]
         o_d, _, i_d, _ = cached_occlusion(self.cache, x, n, n, at_vertices[1], self.light, self.radiance)

@@ -22,6 +22,7 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.environment import turn_environment
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
@@ -47,6 +48,7 @@ from splitnerf.refinement.unknowns import (
 )
 
 CLAMP_INDIRECT = 10.0
+MOST_GROUPS, GROUP_ROUNDS = 24, 10  # of photos whose lights have about one rotation; rounds of the search for them
 BOUNCES = 3  # scattering events of interreflection
 KEEP = 0.9  # share of the observations that is kept after a sweep
 # Weights of the prior; three numbers are those of albedo, gloss and normal.
@@ -168,7 +170,10 @@ class Refinement:
             torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (asset.normals, asset.tangents, asset.uv)
         ]
         self.light = EnvironmentLight(torch.from_numpy(environment))
-        self.light_equations = LightEquations(self.light, surroundings=dataset.surroundings)
+        self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns)
+        seen = dataset.surroundings if self.turns is None else None
+        self.light_equations = LightEquations(self.light, surroundings=seen)
+        self.groups = None if self.turns is None else groups_of(dataset.light_turns, self.pixels.view)
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
@@ -189,6 +194,8 @@ class Refinement:
 
     def make_lamp_compact(self) -> CompactLamp | None:
         """Makes the brightest lobe of the light compact if the albedo shows the edge of its shadow; else None."""
+        if self.turns is not None:  # its shadow would stand elsewhere in each photo
+            return None
         light, lamp = compact_lamp(self.texels, self.light.radiance().numpy(), self.patch_width, self.settings.seed)
         if lamp is not None:
             self.light.set_radiance(torch.from_numpy(light))
@@ -234,7 +241,10 @@ class Refinement:
     def see(self) -> tuple[np.ndarray, SurfaceSamples]:
         """Draws a batch: numbers of pixels [b] whose two rays both meet the asset, and the rays' points [2 b]."""
         n = self.settings.pixels
-        index = self.random.integers(0, len(self.pixels), n)
+        if self.groups is None:
+            index = self.random.integers(0, len(self.pixels), n)
+        else:
+            index = self.random.choice(self.groups[self._group()], n)
         offsets = np.stack([self.filter.draw(n, self.random) for _ in range(2)], axis=1)
         origins, directions = (part.reshape(-1, 3) for part in self.pixels.rays(index, offsets))
         triangle, u, v = self.scene.trace_closest(origins, directions)
@@ -244,16 +254,25 @@ class Refinement:
         both = np.repeat(hit, 2)
         return index[hit], self.texels.sample(triangle[both], u[both], v[both], -directions[both])
 
-    def shade(self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor) -> Shaded:
+    def _group(self) -> int:
+        """A group of pixels, by its share of all."""
+        sizes = np.array([len(group) for group in self.groups])
+        return int(self.random.choice(len(sizes), p=sizes / sizes.sum()))
+
+    def shade(
+        self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor, turns: Tensor | None = None
+    ) -> Shaded:
         """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives.
 
-        The estimate is unbiased, except for the clamp and the last bounce of interreflection.
+        The estimate is unbiased, except for the clamp and the last bounce of interreflection. With `turns`, the rotations
+        [n, 3, 3] of directions into the light's frame, light that was reflected comes from that of the first point.
         """
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
+        around = light if turns is None else torch.from_numpy(turn_environment(light.numpy(), turns[0].numpy()))
         arriving = incoming_light(
             surface,
-            light,
+            around,
             samples.positions,
             samples.geometric,
             m.normals.detach(),
@@ -266,7 +285,8 @@ class Refinement:
             clamp_indirect=CLAMP_INDIRECT,
             seed=s.seed + self.n_batches,
         )
-        texels, shares = footprints(self.light.height, arriving.directions.view(-1, 3))
+        towards = arriving.directions if turns is None else arriving.directions @ turns.transpose(1, 2)
+        texels, shares = footprints(self.light.height, towards.reshape(-1, 3))
         sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
         drawn = (m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf)
@@ -280,7 +300,8 @@ class Refinement:
         (index, samples), photos = self.see(), self.pixels
         texels, shares = self.texels.rows(samples.footprints), samples.footprints.weights
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
-        shaded = self.shade(surface, samples, unknowns)
+        turns = None if self.turns is None else self.turns[self.pixels.view[index]].repeat_interleave(2, 0)
+        shaded = self.shade(surface, samples, unknowns, turns)
         colours = shaded.colours
         target, brightest, saturated = (
             torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated)
@@ -345,6 +366,22 @@ class Refinement:
         self.equations.move(step)
         self.step_seconds = time.monotonic() - gathered
         return error, step.square().mean(0).sqrt().tolist()
+
+
+def groups_of(turns: np.ndarray, view: np.ndarray) -> list[np.ndarray]:
+    """The pixels' numbers in groups of photos whose lights have about one rotation.
+
+    Args:
+        turns: [views, 3, 3] rotations.
+        view: [n] the pixels' photos.
+    """
+    middles = turns[np.unique(np.linspace(0, len(turns) - 1, MOST_GROUPS).round().astype(int))]
+    for _ in range(GROUP_ROUNDS):  # k-means of rotations
+        group = np.einsum("vij,kij->vk", turns, middles).argmax(axis=1)
+        sums = [turns[group == k].sum(axis=0) for k in np.unique(group)]
+        middles = np.stack([left @ right for left, _, right in map(np.linalg.svd, sums)])
+    group = np.einsum("vij,kij->vk", turns, middles).argmax(axis=1)
+    return [numbers for k in range(len(middles)) if len(numbers := np.flatnonzero(group[view] == k))]
 
 
 def decibels(error: float) -> float:

@@ -31,6 +31,7 @@ ENVIRONMENT_ROWS = 128  # of the image of a trained light
 N_FEATURES = 2  # of a level of the hash grid
 N_OUTPUTS = 13  # of the surface's network, the distance among them
 HEAD_LAYERS = 2  # hidden layers of the networks of material and occlusion
+TURNS = 16  # rotations of the light over which that of the cached occlusion is averaged
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
 
@@ -313,6 +314,12 @@ class SceneModel(nn.Module):
             sent,
             self.config.shading.compensate,
         )
+
+    def use_turns(self, turns: Tensor | None) -> None:
+        """Averages the light of the cached occlusion over some of the photos' rotations [views, 3, 3] of it; None: it stands
+        still."""
+        chosen = None if turns is None else turns[torch.linspace(0, len(turns) - 1, min(len(turns), TURNS)).long()]
+        self.occlusion.turns = chosen
 
     @property
     def sums_light(self) -> bool:

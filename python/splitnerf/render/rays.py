@@ -101,6 +101,7 @@ class PixelSource:
 
     Attributes:
         edges: The pixels along the masks' edges; None where there are none, or the photos have no colours outside.
+        turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`, or None.
         foreground, known: The valid pixels near a mask, and all valid pixels.
         possible: [n, h, w] bool, where the photos may show the object: within the masks, and at invalid pixels. Those
             of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
@@ -110,6 +111,7 @@ class PixelSource:
         self.device = generator.device
         self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
         self.pixels = PixelReader(dataset.images, self.device)
+        self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns).to(self.device)
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator

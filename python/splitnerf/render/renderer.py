@@ -246,6 +246,7 @@ def render_rays(
     *,
     shades_per_ray: int = 0,
     capacity: tuple[int, int] | None = None,
+    turns: Tensor | None = None,
 ) -> RenderedRays:
     """Renders rays from their samples.
 
@@ -258,6 +259,7 @@ def render_rays(
         capacity: The capacity for shaded samples and segments, see :func:`splitnerf.ops.spread_samples`; with None the
             host waits for the GPU's counts. If ``sizes`` of the result exceeds the capacity, the colours have no
             meaning.
+        turns: [n_rays, 3, 3] rotations of directions into the light's frame; None where the light stands still.
 
     Source: SplitNeRF Eq. (1)-(2), (17).
     """
@@ -282,7 +284,8 @@ def render_rays(
     view_dirs = -directions
     sdf = outputs[:, 0]
     segments = RaySegments(spread.leaders, spread.stretch)
-    points = model.shade(light, positions, outputs, features, normals, view_dirs, segments)
+    turned = light if turns is None else light.turned(turns[samples.ray_indices.index_select(0, shaded)])
+    points = model.shade(turned, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
     mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
@@ -316,7 +319,14 @@ def render_rays(
 
 @torch.no_grad()
 def render_view(
-    model: SceneModel, cells: Tensor, pose: Tensor, intrinsics: Tensor, height: int, width: int, chunk: int = 8192
+    model: SceneModel,
+    cells: Tensor,
+    pose: Tensor,
+    intrinsics: Tensor,
+    height: int,
+    width: int,
+    chunk: int = 8192,
+    turn: Tensor | None = None,
 ) -> dict[str, Tensor]:
     """Renders a whole view with its maps.
 
@@ -327,6 +337,7 @@ def render_view(
         intrinsics: [4] fx, fy, cx, cy in pixels.
         height, width: The image's size in pixels.
         chunk: Rays rendered at a time.
+        turn: [3, 3] the rotation of directions into the light's frame; None where the light stands still.
 
     Returns:
         rgb [H, W, 3] sRGB un-premultiplied in [0, 1], alpha [H, W], albedo [H, W, 3] linear, roughness, metallic,
@@ -335,7 +346,8 @@ def render_view(
     rays_o, rays_d = image_rays(pose, intrinsics, height, width)
     light, rows = model.evaluate_light(), []
     for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
-        ray = render_rays(model, light, find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5)))
+        found = find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5))
+        ray = render_rays(model, light, found, turns=None if turn is None else turn.expand(len(o), 3, 3))
         p = ray.points
         maps = torch.cat(
             [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],
@@ -361,5 +373,6 @@ def render_view(
 def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
     """All maps of one view as float32 arrays, see :func:`render_view`."""
     pose, intrinsics = (torch.from_numpy(x[index]).to(model.device) for x in (dataset.poses, dataset.intrinsics))
-    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width)
+    turn = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns[index]).to(model.device)
+    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width, turn=turn)
     return {name: value.cpu().numpy() for name, value in maps.items()}

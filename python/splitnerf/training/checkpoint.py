@@ -184,6 +184,8 @@ def _check_content(content: dict) -> None:
     if not (box[0, 0] > 0 and torch.equal(box[:, :3], box[0, 0] * torch.eye(4, 3).double()) and box[3, 3] == 1):
         raise ValueError("box_from_world is not a uniform scale and a translation")
     _check_cameras(content.get("cameras"))
+    if (turns := content.get("light_turns")) is not None:
+        check_tensor("the light's turns", turns, (len(content["cameras"]["poses"]), 3, 3), torch.float32)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
         check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)

@@ -72,8 +72,11 @@ class TrainingState:
         self.grid = make_grid(c, self.hull, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         step = Step if device.type == "cpu" else GpuStep
-        seen = None if dataset.surroundings is None else SeenLight(dataset.surroundings, device)
+        still = self.source.turns is None
+        seen = SeenLight(dataset.surroundings, device) if still and dataset.surroundings is not None else None
+        self.model.use_turns(self.source.turns)
         self.take_step = step(self.model, self.grid, self.mesh, self.generator, self.optimiser, self.exposures, seen)
+        self.take_step.turns = source.turns
         self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
         self.environment: Tensor | None = None  # the light that weighs traced occlusion
         self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.constants.initial_rays, 0.0
@@ -143,6 +146,7 @@ class TrainingState:
                 box_from_world=torch.from_numpy(self.dataset.box_from_world),
                 start=None if held is None else held.state(),
                 cameras=Cameras.of(self.dataset)._asdict(),
+                light_turns=self.source.turns,
                 **self.mesh.state(),
             ),
         )

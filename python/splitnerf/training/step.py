@@ -134,6 +134,8 @@ class Step:
     Attributes:
         capacity: The capacity of the last step's results.
         start: The shape that the run began with, near which the surface is held at first; None: a sphere, which holds nothing.
+        turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`; None: it stands
+            still.
         skipped: The number of steps whose gradients could not be used.
         newest: The rays of the last step, and their rendering.
         s: The sharpness as far as it is known without waiting.
@@ -141,6 +143,7 @@ class Step:
     """
 
     start: StartShape | None = None
+    turns: Tensor | None = None
     newest: tuple[Batch, RenderedRays] | None = None
     s: float | None = None
     late: LateOcclusion | None = None
@@ -270,7 +273,10 @@ class Step:
         """Renders found samples and takes the gradients; for ``capacity`` see
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
-        ray = render_rays(self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity)
+        turns = None if self.turns is None else self.turns[batch.view]
+        ray = render_rays(
+            self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity, turns=turns
+        )
         terms = losses.loss_terms(
             self.model,
             light,

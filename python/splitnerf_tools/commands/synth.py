@@ -55,6 +55,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth, and "
         "only these and stanford-orb take --relight",
     )
+    parser.add_argument(
+        "--turntable",
+        action="store_true",
+        help="the object turns before the camera, so that the light turns with the camera",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
     parser.set_defaults(execute=run)
 
@@ -67,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.material and not args.shape:
         raise InputError("--material is that of a built-in shape; give --shape, or leave it out")
-    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.seed)
+    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.seed, args.turntable)
     with tempfile.TemporaryDirectory() as folder:
         asset = args.asset
         if args.shape:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from splitnerf.data.asset import Asset
-from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.environment import read_environment, resize_environment, turn_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.relit import PREFIX
 from splitnerf.errors import InputError
@@ -49,6 +49,7 @@ class SynthSettings:
         spp: Paths a pixel.
         layout: A key of :data:`WRITERS`.
         seed: The seed of the renderings and of the first camera's azimuth.
+        turntable: Whether the object turns before a camera that goes up and down alone, and the light with the camera.
     """
 
     size: int = 200
@@ -57,6 +58,7 @@ class SynthSettings:
     spp: int = 256
     layout: str = "blender"
     seed: int = 0
+    turntable: bool = False
 
     def check(self) -> None:
         """Raises InputError where a setting has no meaning."""
@@ -65,6 +67,10 @@ class SynthSettings:
                 raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
         if self.seed < 0:
             raise InputError(f"--seed must not be negative, got {self.seed}")
+        if self.turntable and self.layout != "blender":
+            raise InputError(
+                f"--turntable: the layout {self.layout} has no word for the light's rotation; leave it out"
+            )
         if self.layout not in WRITERS:
             raise InputError(f"--layout must be one of {', '.join(WRITERS)}, got {self.layout}")
 
@@ -150,10 +156,21 @@ def render_views(
 
         for split, poses in cameras.items():
             for i, pose in enumerate(poses):
-                writer.view(split, i, pose, shot(light, pose))
+                if settings.turntable:
+                    here = turn_to(pose, cameras["train"][0])
+                    writer.view(split, i, pose, shot(turn_environment(light, here), pose), light_turn=here)
+                else:
+                    writer.view(split, i, pose, shot(light, pose))
         for name, environment in relight.items():
             for i, pose in enumerate(cameras["test"]):
                 writer.relit("test", i, name, pose, shot(environment, pose))
+
+
+def turn_to(pose: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """[3, 3] the rotation about z that carries the azimuth of a camera to that of another one."""
+    angle = np.arctan2(first[1, 3], first[0, 3]) - np.arctan2(pose[1, 3], pose[0, 3])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 def unit_sphere(asset: Asset) -> tuple[np.ndarray, float]:

@@ -99,12 +99,14 @@ class SceneWriter(ViewWriter):
         self.layout = layout
         self._views: dict[str, list[tuple[Path, dict]]] = {}
 
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps, light_turn: np.ndarray | None = None) -> None:
+        """See :meth:`ViewWriter.view`; `light_turn` [3, 3] is that of :class:`splitnerf.data.layouts.frame.Frame`."""
         image = self._image_path(split, index)
         write_image(image, straight_rgba(maps))
         height, width = maps["alpha"].shape
         if self.layout == "blender":
             entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
+            entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
         else:
             entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
             entry |= {"imw": width, "imh": height}

@@ -37,6 +37,8 @@ class Frame:
         dynamic_mask_path: A file that is white where the image is to be ignored, or None.
         exposure: The factor of the image's linear values.
         gamma: The exponent of its values that gives linear ones; 0 where its curve is sRGB's.
+        light_turn: [3, 3] the rotation that carries directions of the data's world to those in which the light stands still, or
+            None where it stands still in the data's world.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Frame:
     dynamic_mask_path: Path | None = None
     exposure: float = 1.0
     gamma: float = 0.0
+    light_turn: np.ndarray | None = None
 
 
 def checked_pose(matrix: object, name: str) -> np.ndarray:

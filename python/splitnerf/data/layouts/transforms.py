@@ -10,6 +10,7 @@ Keys, those of a frame before those of the file:
     frames[].transform_matrix   4 x 4 camera-to-world, OpenGL axes
     frames[].mask_path          null or a mask
     mask_kind                   what the masks mean, "object" or "ignore"; without it :mod:`splitnerf.data.dataset` finds out
+    frames[].light_rotation     3 x 3, from directions of the world to those in which the light stands still (a turntable)
     frames[].exposure           the factor of the image's linear values, 1 where it is missing
     gamma                       linear values are those of the image to this power, where the camera's curve is not sRGB's
     camera_angle_x, camera_angle_y, fl_x, fl_y, cx, cy, w, h   the pinhole; what is missing of one axis is that of the other
@@ -47,6 +48,7 @@ OF_FILE = OF_BOTH | {"frames", "train_filenames", "test_filenames", "val_filenam
 OF_FRAME = OF_BOTH | {
     "file_path",
     "transform_matrix",
+    "light_rotation",
     "mask_path",
     "exposure",
     "rotation",
@@ -193,7 +195,21 @@ def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | N
         dynamic_mask_path=dynamic if is_file(dynamic) else None,
         exposure=_read_exposure(entry, index, path),
         gamma=_read_gamma(entry.get("gamma", meta.get("gamma", 0.0)), path),
+        light_turn=_read_turn(entry.get("light_rotation"), index, path),
     )
+
+
+def _read_turn(matrix: object, index: int, path: Path) -> np.ndarray | None:
+    """The rotation of a frame's light. Raises InputError where it is none."""
+    if matrix is None:
+        return None
+    try:
+        turn = np.array(matrix, np.float64)
+    except (ValueError, TypeError, OverflowError):
+        turn = np.empty(0)
+    if turn.shape != (3, 3) or not np.abs(turn.T @ turn - np.eye(3)).max() < 1e-3 or np.linalg.det(turn) < 0:
+        raise InputError(f"{path}: 'light_rotation' of frame {index} must be a rotation, 3 x 3; repair it")
+    return turn
 
 
 def _read_exposure(entry: dict, index: int, path: Path) -> float:

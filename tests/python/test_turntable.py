@@ -1,0 +1,190 @@
+"""Photos whose light is turned in each: what is read of it, the light that points and photos get, and what a run makes of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from blender_data import edit, make_blender
+from painted_ball import lamps, photos, textured
+from scipy.spatial.transform import Rotation
+from splitnerf.cli import DONE, main
+from splitnerf.data.dataset import dataset_fingerprint, load_dataset
+from splitnerf.data.environment import sample_environment, turn_environment
+from splitnerf.data.images import read_image, write_image
+from splitnerf.errors import InputError
+from splitnerf.export.glb import write_glb
+from splitnerf.fields import EvaluatedLight, VisibilityBits
+from splitnerf.fields.light_pyramid import LightPyramid
+from splitnerf.pipeline import load_run
+from splitnerf.refinement.fit import FitSettings, Refinement, groups_of
+from splitnerf.render.renderer import render_view
+from splitnerf_tools.synth.rendering import turn_to
+from test_views import LENS, POSE, SIZE, ball
+from tiny_runs import SMALL, as_options
+
+
+def about_z(*degrees: float) -> np.ndarray:
+    """[n, 3, 3] float32 rotations."""
+    return Rotation.from_euler("z", np.reshape(degrees, (-1, 1)), degrees=True).as_matrix().astype(np.float32)
+
+
+def random_turns(n: int, seed: int = 0) -> torch.Tensor:
+    return torch.from_numpy(Rotation.random(n, random_state=seed).as_matrix()).float()
+
+
+def pyramid(seed: int = 0) -> LightPyramid:
+    """A light that differs in all directions."""
+    light = LightPyramid(32)
+    with torch.no_grad():
+        light.texels.copy_(0.7 * torch.randn(light.texels.shape, generator=torch.Generator().manual_seed(seed)))
+    return light
+
+
+def test_the_rotations_of_the_light_are_read(tmp_path):
+    make_blender(tmp_path, train=6, test=2)
+    still = load_dataset(tmp_path)
+    assert still.light_turns is None
+    turn = about_z(30.0)[0]
+    edit(tmp_path, lambda meta: meta["frames"][2].update(light_rotation=turn.tolist()))
+    turned = load_dataset(tmp_path)
+    assert turned.light_turns[2] == pytest.approx(turn) and turned.light_turns[[0, 5]] == pytest.approx(
+        np.tile(np.eye(3), (2, 1, 1))
+    )
+    assert turned.select([2]).light_turns == pytest.approx(turn[None])
+    assert dataset_fingerprint(turned) != dataset_fingerprint(still)
+
+
+@pytest.mark.parametrize("matrix", [2 * np.eye(3), -np.eye(3), np.eye(4), "z", 3.0])
+def test_what_is_no_rotation_is_refused(tmp_path, matrix):
+    make_blender(tmp_path, train=6, test=2)
+    given = matrix.tolist() if isinstance(matrix, np.ndarray) else matrix
+    edit(tmp_path, lambda meta: meta["frames"][1].update(light_rotation=given))
+    with pytest.raises(InputError, match="light_rotation' of frame 1"):
+        load_dataset(tmp_path)
+
+
+def test_points_look_up_the_light_in_its_own_frame():
+    maps, turns = pyramid().evaluate(), random_turns(5)
+    directions, roughness = torch.nn.functional.normalize(torch.randn(10, 3), dim=1), torch.rand(10, 1)
+    light = EvaluatedLight(maps)
+    found = light.turned(turns)(directions, roughness)
+    mean = light.mean_over(turns)(directions, roughness)
+    each = torch.stack([maps(directions @ turn.T, roughness) for turn in turns])
+    assert torch.allclose(found, torch.cat([each[i % 5, i : i + 1] for i in range(10)]), rtol=1e-3, atol=1e-4)
+    assert torch.allclose(mean, each.mean(0), rtol=1e-3, atol=1e-4)
+
+
+def test_a_view_under_a_turned_light_is_the_turned_view():
+    """A ball looks from a camera as it does from a turned one, if the light turns with the camera."""
+    model, cells = ball()
+    with torch.no_grad():
+        model.light.texels[:16] = torch.randn(16, 3, generator=torch.Generator().manual_seed(0))  # a smooth light
+        for parameter in model.material.parameters():
+            parameter.zero_()
+    turn = torch.eye(4)
+    turn[:3, :3] = random_turns(1)[0]
+    expected = render_view(model, cells, turn @ POSE, LENS, SIZE, SIZE)
+    found = render_view(model, cells, POSE, LENS, SIZE, SIZE, turn=turn[:3, :3])
+    still = render_view(model, cells, POSE, LENS, SIZE, SIZE)
+    covered = (expected["alpha"] > 0.9) & (found["alpha"] > 0.9)
+    errors = [(rgb["rgb"] - expected["rgb"])[covered].abs().mean() for rgb in (found, still)]
+    assert covered.sum() > 30 and errors[0] < 0.04 and errors[1] > 2 * errors[0]
+
+
+def test_cells_have_the_mean_of_the_turned_lights():
+    bits, light = VisibilityBits(256, 0.01, 1, indirect=False), pyramid(1)
+    turns = about_z(*np.arange(0, 360, 90))
+    bits.turns = torch.from_numpy(turns)
+    bits.aim(EvaluatedLight(light.evaluate()))
+    assert torch.equal(bits.aims, bits.centres)
+    found = bits.cell_light(light.evaluate())
+    panorama = light.panorama(64).numpy()
+    mean = np.mean([turn_environment(panorama, turn) for turn in turns], axis=0)
+    bits.turns = None
+    fixed = bits.cell_light(light.evaluate())
+    ours, theirs = found.radiance.detach().numpy(), sample_environment(mean, bits.centres.numpy())
+    assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.9
+    weights = found.solid_angles[:, None] / found.solid_angles.sum()
+    assert torch.allclose((found.radiance * weights).sum(0), (fixed.radiance * weights).sum(0), rtol=0.02)
+    assert found.radiance.std() < 0.8 * fixed.radiance.std()
+
+
+def test_photos_are_grouped_by_the_rotation_of_their_light():
+    degrees = np.concatenate([np.arange(0, 360, 90) + d for d in (-1.0, 0.0, 2.0)])
+    view = np.repeat(np.arange(12), 5)
+    groups = groups_of(about_z(*degrees), view)
+    assert sorted(np.concatenate(groups).tolist()) == list(range(60))
+    assert all(len(set(np.round(degrees[view[group]] / 90) % 4)) == 1 for group in groups)
+    many = groups_of(random_turns(200).numpy(), np.arange(200))
+    assert len(many) <= 24 and sum(map(len, many)) == 200
+
+
+def test_the_truth_explains_photos_of_a_turntable(painted):
+    """Only in the light's own frame of each photo."""
+    asset, light = painted[0], lamps()
+    turns = about_z(*(36.0 * np.arange(10)))
+    data = photos(asset, light, turns=turns)
+    settings = FitSettings(sweeps=1, pixels=600)
+    known = Refinement(data, asset, light, settings)
+    error = np.mean([known.gather(known.surface()) for _ in range(6)])
+    ignored = Refinement(replace(data, light_turns=None), asset, light, settings)
+    assert error < 2e-4 and np.mean([ignored.gather(ignored.surface()) for _ in range(6)]) > 10 * abs(error)
+    assert known.make_lamp_compact() is None
+
+
+def test_made_data_turn_the_light_with_the_camera(tmp_path):
+    """A ball of one colour looks alike from all sides of one height, as it does to a camera that does not move."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    write_glb(tmp_path / "ball.glb", textured(mesh.vertices, mesh.faces))
+    write_image(tmp_path / "light.hdr", lamps())
+    options = ["--size", "24", "--train", "4", "--test", "6", "--spp", "256"]
+    words = ["synth", str(tmp_path / "ball.glb"), "--light", str(tmp_path / "light.hdr"), *options]
+    assert main([*words, "--out", str(tmp_path / "turn"), "--turntable"]) == DONE
+    assert main([*words, "--out", str(tmp_path / "still")]) == DONE
+
+    def spread(data) -> float:
+        frames = json.loads((data / "transforms_test.json").read_text())["frames"]
+        pictures = np.stack([read_image(data / f"{frame['file_path']}.png")[..., :3] for frame in frames])
+        heights = np.array([frame["transform_matrix"][2][3] for frame in frames])
+        pairs = [(i, j) for i in range(6) for j in range(i) if abs(heights[i] - heights[j]) < 0.05]
+        assert pairs
+        return float(np.mean([np.abs(pictures[i] - pictures[j])[8:16, 8:16].mean() for i, j in pairs]))
+
+    assert spread(tmp_path / "turn") < 0.25 * spread(tmp_path / "still")
+    turns = load_dataset(tmp_path / "turn").light_turns
+    poses = load_dataset(tmp_path / "turn").world_poses
+    azimuths = [np.arctan2(*(turn @ pose[:3, 3])[1::-1]) for turn, pose in zip(turns, poses)]
+    assert azimuths == pytest.approx([azimuths[0]] * len(azimuths), abs=1e-5)
+    assert turn_to(poses[0], poses[0]) == pytest.approx(np.eye(3))
+    assert main([*words, "--out", str(tmp_path / "neus"), "--turntable", "--layout", "neus"]) == 2
+
+
+def test_a_run_of_a_turntable_goes_to_its_end(data, tmp_path, capsys):
+    """Trained, stopped, resumed, refined, exported and scored."""
+    turned = tmp_path / "data"
+    shutil.copytree(data, turned)
+    for split in ("train", "test"):
+        content = json.loads((turned / f"transforms_{split}.json").read_text())
+        for i, frame in enumerate(content["frames"]):
+            frame["light_rotation"] = about_z(40.0 * i)[0].tolist()
+        (turned / f"transforms_{split}.json").write_text(json.dumps(content))
+    run = tmp_path / "run"
+    words = ["train", str(turned), "--out", str(run), *as_options(SMALL)]
+    assert main([*words, "--steps", "24"]) == DONE
+    assert main([*words, "--steps", "40", "--resume"]) == DONE
+    scores = json.loads((run / "evaluation.json").read_text())
+    assert scores["novel_view"]["psnr"] > 8
+    model, _, content = load_run(run)
+    assert len(content["light_turns"]) == 6 and len(model.occlusion.turns) == 6
+    assert model.config.shading.method == "split"
+    assert main(["evaluate", str(run), "--data", str(turned), "--spp", "1"]) == DONE
+    mlp = [*words, "--set", "occlusion.kind=mlp", "--set", "shading.method=split", "--overwrite"]
+    assert main(mlp) == 2
+    assert "photos of a turntable need occlusion.kind" in capsys.readouterr().err
+    assert json.loads((run / "evaluation.json").read_text())  # the run stays
