@@ -18,13 +18,14 @@ namespace splitnerf::glue {
 
 // The operators that are more than bodies, with a strategy of its own for each device: device.hash_encode(...) is
 // cpu::hash_encode(...) or cuda::hash_encode(queue, ...).
-#define SPLITNERF_EACH_STRATEGY(X)                                                                  \
-  X(hash_encode)                                                                                    \
-  X(hash_encode_backward)                                                                           \
-  X(hash_encode_backward_positions)                                                                 \
-  X(prefilter_light)                                                                                \
-  X(prefilter_light_backward) X(light_lookup_backward) X(spread_samples) X(sdf_values) X(sdf_field) \
-      X(sdf_field_backward) X(sample_rays) X(shared_light_backward)
+#define SPLITNERF_EACH_STRATEGY(X)  \
+  X(hash_encode)                    \
+  X(hash_encode_backward)           \
+  X(hash_encode_backward_positions) \
+  X(prefilter_light)                \
+  X(prefilter_light_backward)       \
+  X(light_lookup_backward)          \
+  X(spread_samples) X(sdf_values) X(sdf_field) X(sdf_field_backward) X(sample_rays) X(shared_light_backward)
 
 // What an operator asks of a device. The first argument names the operator in errors of a GPU; scratch memory lives until the
 // call of on_device ends.
