@@ -12,8 +12,9 @@ from painted_ball import photos, textured, with_textures
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
-from splitnerf.refinement.fit import FitSettings, Stage
+from splitnerf.refinement.fit import FitSettings
 from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, unit
+from splitnerf.refinement.stage import Stage
 from splitnerf.refinement.texels import AssetTexels
 
 SUN = unit(np.array([0.5, -0.3, 0.8]))

@@ -24,11 +24,12 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import Protocol, score_asset
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
-from splitnerf.refinement import fit
 from splitnerf.refinement import refine as refinement_files
-from splitnerf.refinement.fit import FitSettings, Refinement, Stage
+from splitnerf.refinement import stage as stage_module
+from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.refinement.refine import OtherState, refine_folder
+from splitnerf.refinement.stage import Stage
 from splitnerf_tools.report.sections import refinement_section
 from tiny_runs import train
 
@@ -333,7 +334,7 @@ class Clock:
 
     def __init__(self, monkeypatch, of_batch: float, of_round: float = 0.0):
         self.now, self.rounds = 0.0, []
-        monkeypatch.setattr(fit.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(stage_module.time, "monotonic", lambda: self.now)
         gather = Refinement.gather
 
         def slow_batch(refinement, surface):
@@ -347,7 +348,7 @@ class Clock:
             return asset, []
 
         monkeypatch.setattr(Refinement, "gather", slow_batch)
-        monkeypatch.setattr(fit, "fit_outline", slow_outline)
+        monkeypatch.setattr(stage_module, "fit_outline", slow_outline)
 
 
 def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypatch):

@@ -18,10 +18,11 @@ from splitnerf.errors import InputError
 from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.refinement import fit as fit_module
-from splitnerf.refinement.fit import FitSettings, Refinement, refine, srgb_slope
+from splitnerf.refinement.fit import FitSettings, Refinement, srgb_slope
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.refine import fitting_height
+from splitnerf.refinement.stage import refine
 from splitnerf.refinement.texels import AssetTexels, materials_of, patch_width
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer

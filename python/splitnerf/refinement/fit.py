@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,10 +31,9 @@ from splitnerf.refinement.lamps import CompactLamp, compact_lamp
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
-from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.similar_texels import usual_gloss
-from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, check_form, materials_of, patch_width
+from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, materials_of, patch_width
 from splitnerf.refinement.unknowns import (
     GROUPS,
     METALLIC,
@@ -59,9 +58,7 @@ LIKE_METAL = 2.0  # of its metallic from the usual one of its colour and place, 
 ANCHOR = 0.02  # distance from the start
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
-LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
 LEAST_BATCHES = 8  # of a sweep, however short the time
-OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -71,7 +68,7 @@ class FitSettings:
 
     Attributes:
         sweeps: Gauss-Newton steps.
-        minutes: Time limit of the outline and the sweeps, see :class:`Stage`; 0: none.
+        minutes: Time limit of the outline and the sweeps, see :class:`splitnerf.refinement.stage.Stage`; 0: none.
         sweep_share: Pixels of a sweep as a share of all, at most SWEEP_PIXELS, and fewer where the minutes are short.
         pixels: Pixels of a batch.
         directions: Directions of a ray's point.
@@ -89,45 +86,6 @@ class FitSettings:
     light_step: float = 0.5
     outline: bool = True
     seed: int = 0
-
-
-@dataclass(frozen=True)
-class Refined:
-    """The result of a refinement.
-
-    Attributes:
-        asset: The asset.
-        light: [h, 2 h, 3] linear radiance.
-        outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
-            shape was kept.
-        sweeps: The report of each sweep.
-        saturated: The share of the covered pixels' values that the photos clip.
-        lamp: The lamp that was made compact at the start, or None.
-    """
-
-    asset: Asset
-    light: np.ndarray
-    outline: list[float]
-    sweeps: list[Sweep]
-    saturated: float
-    lamp: CompactLamp | None
-
-
-class Sweep(NamedTuple):
-    """The report of one sweep.
-
-    Attributes:
-        number: Sweeps so far.
-        seconds: Time since the start.
-        error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of
-            the brightest pixel around; it may come out slightly negative.
-        moved: [7] root mean square of the step, by unknown.
-    """
-
-    number: int
-    seconds: float
-    error: float
-    moved: list[float]
 
 
 class Shaded(NamedTuple):
@@ -384,150 +342,6 @@ def groups_of(turns: np.ndarray, view: np.ndarray) -> list[np.ndarray]:
     return [numbers for k in range(len(middles)) if len(numbers := np.flatnonzero(group[view] == k))]
 
 
-def decibels(error: float) -> float:
-    """The PSNR of a mean squared error, which may come out as 0 or less where it is estimated."""
-    return -10.0 * math.log10(max(error, 1e-8))
-
-
 def srgb_slope(linear: Tensor) -> Tensor:
     """d sRGB / d linear of values above 0.0031308. Source: IEC 61966-2-1."""
     return 1.055 / 2.4 * linear ** (1 / 2.4 - 1)
-
-
-class Stage:
-    """A refinement, sweep by sweep, with a state from which another process can continue.
-
-    The minutes limit it: after OUTLINE_SHARE of them no further round of the outline begins, except the first, and no
-    lamp is searched for. A sweep takes at most a LEAST_SWEEPS-th of them, the last one the rest. One sweep is always
-    made.
-
-    Args:
-        dataset, asset, environment, settings: See :class:`Refinement`.
-        state: What :meth:`state` returned with the same arguments (`sweeps` and `minutes` may differ); None begins.
-        show: Called often with the share done and a message.
-
-    Attributes:
-        outline, sweeps, lamp: See :class:`Refined`.
-
-    Raises:
-        ValueError, KeyError, TypeError: The asset or the light has another form, or the state belongs to another
-            refinement.
-        InputError: The photos show nothing.
-    """
-
-    def __init__(
-        self,
-        dataset: Dataset,
-        asset: Asset,
-        environment: np.ndarray,
-        settings: FitSettings,
-        state: dict | None = None,
-        show: Callable[[float, str], None] = lambda share, message: None,
-    ):
-        check_form(asset)
-        self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
-        self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
-        if state is not None:
-            check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
-            asset = replace(asset, vertices=state["vertices"].numpy())
-            self.outline, self.sweeps = list(map(float, state["outline"])), [Sweep(*sweep) for sweep in state["sweeps"]]
-            self.started -= float(state["seconds"])
-        elif settings.outline:
-            asset, self.outline = fit_outline(dataset, asset, settings.seed, self._begins)
-        show(self.progress, "refinement, the texels' pixels")
-        self.fit, self.lamp = Refinement(dataset, asset, environment, settings), None
-        if state is not None:
-            self.fit.restore(state["fit"])
-            self.lamp = None if state["lamp"] is None else CompactLamp(*state["lamp"])
-        elif settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
-            show(self.progress, "refinement, looking for a lamp")
-            self.lamp = self.fit.make_lamp_compact()
-
-    def _begins(self, turn: int) -> bool:
-        """Whether there is time for a round of the outline as long as those before; always for the first."""
-        self.show(self.progress, f"refinement, outline, round {turn + 1} of {ROUNDS}")
-        return turn == 0 or self.seconds * (turn + 1) / turn <= OUTLINE_SHARE * self.limit
-
-    @property
-    def seconds(self) -> float:
-        """Seconds spent in all parts of the refinement."""
-        return time.monotonic() - self.started
-
-    @property
-    def limit(self) -> float:
-        """The time limit in seconds."""
-        return 60.0 * self.settings.minutes if self.settings.minutes > 0 else math.inf
-
-    @property
-    def finished(self) -> bool:
-        """Whether all sweeps are made, or what is left of the minutes is less than half of a sweep like the last
-        one."""
-        if len(self.sweeps) >= self.settings.sweeps:
-            return True
-        return bool(self.sweeps) and self.limit - self.seconds <= 0.5 * self.last_seconds
-
-    @property
-    def progress(self) -> float:
-        """The share done, in [0, 1]: of the sweeps, or of the minutes where those are further; 1 at the end alone."""
-        if self.finished:
-            return 1.0
-        return min(0.99, max(len(self.sweeps) / self.settings.sweeps, self.seconds / self.limit))
-
-    def advance(self) -> Sweep:
-        """Makes one sweep. Raises RuntimeError where numbers are no longer finite."""
-        started = self.seconds
-        seconds = self.limit / LEAST_SWEEPS
-        if self.sweeps:
-            seconds = min(seconds, self.limit - started)
-        message = self.message(len(self.sweeps) + 1)
-        error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
-        self.last_seconds = self.seconds - started
-        self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
-        return self.sweeps[-1]
-
-    def message(self, step: int) -> str:
-        """The message of a step, with the error of the photos before the last whole step."""
-        return f"refinement, step {step}" + (
-            f", photos {decibels(self.sweeps[-1].error):.2f} dB" if self.sweeps else ""
-        )
-
-    def state(self) -> dict[str, object]:
-        """The state from which the refinement continues, as tensors and plain values."""
-        vertices = torch.from_numpy(np.ascontiguousarray(self.fit.texels.asset.vertices, np.float32))
-        return {
-            "vertices": vertices,
-            "outline": self.outline,
-            "sweeps": [list(sweep) for sweep in self.sweeps],
-            "lamp": None if self.lamp is None else list(self.lamp),
-            "seconds": self.seconds,
-            "fit": self.fit.state(),
-        }
-
-    def result(self) -> Refined:
-        """The result so far."""
-        fit = self.fit
-        light, saturated = fit.light.radiance().detach().numpy(), float(fit.pixels.saturated.mean())
-        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, saturated, self.lamp)
-
-
-def refine(
-    dataset: Dataset,
-    asset: Asset,
-    environment: np.ndarray,
-    settings: FitSettings,
-    report: Callable[[Sweep], None] = lambda sweep: None,
-) -> Refined:
-    """Fits an asset's outline, its textures and the light to photos; see :class:`Refinement` for the arguments.
-
-    Args:
-        report: Called after each sweep.
-
-    Raises:
-        ValueError: The asset or the light has another form than :class:`Refinement` takes.
-        InputError: The photos show nothing of the asset.
-        RuntimeError: Numbers are no longer finite.
-    """
-    stage = Stage(dataset, asset, environment, settings)
-    while not stage.finished:
-        report(stage.advance())
-    return stage.result()

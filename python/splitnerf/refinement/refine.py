@@ -28,7 +28,8 @@ from splitnerf.export.environment import write_environment
 from splitnerf.export.glb import write_glb
 from splitnerf.files import locked
 from splitnerf.progress import Interrupt, Progress
-from splitnerf.refinement.fit import FitSettings, Refined, Stage, decibels
+from splitnerf.refinement.fit import FitSettings
+from splitnerf.refinement.stage import Refined, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
