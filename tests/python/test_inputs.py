@@ -75,7 +75,7 @@ FORMS = {
     ),
     "opaque": rgba(255 * DISC, np.full_like(DISC, 255, np.uint8)),
     "palette": palette(DISC, (0, 0, 0), (128, 0, 0)),
-    "palette, dark": palette(DISC, (200, 200, 200), (10, 10, 10)),
+    "palette, white first": palette(~DISC, (255, 255, 255), (0, 0, 0)),
     "colour, of two": png(np.repeat(255 * DISC[..., None].astype(np.uint8), 3, 2)),
     "bits": png(255 * DISC.astype(np.uint8)).convert("1"),
 }

@@ -16,7 +16,7 @@ MOST_LABELS = 32  # values up to which a mask of more than two of them is taken 
 def read_mask(path: Path) -> np.ndarray:
     """A mask, white where it is set.
 
-    Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries. Of two
+    Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries in colour. Of two
     values the larger one is white and the other one black, whatever they are.
 
     Returns:
@@ -50,11 +50,12 @@ def read_mask(path: Path) -> np.ndarray:
 
 
 def _palette_entries(path: Path) -> np.ndarray | None:
-    """[H, W] the numbers of the entries of a PNG file's palette; None where it has none, or a grey one."""
+    """[H, W] the numbers of the entries of a PNG file's palette; None where it has none, or those in use are grey: programs that
+    make files small order black and white as they like."""
     with open(path, "rb") as file:
         if file.read(26)[25:26] != b"\3":  # the colour type, in the header of a PNG
             return None
     with Image.open(path) as image:
-        colours = np.asarray(image.getpalette("RGB")).reshape(-1, 3)
-        grey = (colours == colours[:, :1]).all() and len(np.unique(np.asarray(image))) > 2
-        return None if grey else np.asarray(image)
+        entries, colours = np.asarray(image), np.asarray(image.getpalette("RGB")).reshape(-1, 3)
+        used = colours[np.flatnonzero(np.bincount(entries.ravel()))]
+        return None if (used == used[:, :1]).all() else entries
