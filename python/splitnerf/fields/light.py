@@ -216,8 +216,7 @@ class Light(nn.Module, abc.ABC):
     def partition(self, at_least: int, device: torch.device) -> LightTexels:
         """The light about the middles of an equirectangular map's texels, see :class:`LightMaps`."""
         directions, solid_angles = equirect_texels(math.ceil(math.sqrt(at_least / 2)), device)
-        roughness = torch.full_like(solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(directions)))
-        return LightTexels(directions, solid_angles, self(directions, roughness))
+        return LightTexels(directions, solid_angles, self(directions, texel_roughness(solid_angles)))
 
     def backward(self) -> None:
         """Does nothing: no gradients accumulate here."""
@@ -247,6 +246,11 @@ def equirect_texels(height: int, device: torch.device) -> tuple[Tensor, Tensor]:
         directions = panorama_directions(height, device).reshape(-1, 3)
         areas = (1.0 - directions[:, 2] ** 2).clamp(min=0.0).sqrt()
         return directions, areas * (4.0 * math.pi / areas.sum())
+
+
+def texel_roughness(solid_angles: Tensor) -> Tensor:
+    """[t, 1] the roughness whose lobe has the mean solid angle of t texels of the sphere."""
+    return torch.full_like(solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(solid_angles)))
 
 
 def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf import _core
-from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, LightTexels, lobe_roughness
+from splitnerf.fields.light import CellLight, EvaluatedLight, LightMaps, LightTexels, lobe_roughness, texel_roughness
 from splitnerf.fields.occlusion import (
     Emitters,
     MaterialsAt,
@@ -114,7 +114,7 @@ class VisibilityBits(OcclusionModel):
     @torch.no_grad()
     def aim(self, light: EvaluatedLight) -> None:
         """Aims each cell's direction at its light, so that a lamp's shadow falls where the lamp stands."""
-        if self.turns is not None:
+        if self.turns is not None:  # a lamp stands elsewhere in each photo
             self.aims = self.centres.clone()
             return
         texels = light.maps.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
@@ -190,16 +190,10 @@ class VisibilityBits(OcclusionModel):
         that the cells have the power of the light."""
         texels = light.partition(TEXELS_PER_CELL * len(self.centres), self.centres.device)
         if self.turns is not None:
-            texels = texels._replace(
-                radiance=EvaluatedLight(light).mean_over(self.turns)(texels.directions, self._blur(texels))
-            )
+            mean = EvaluatedLight(light).mean_over(self.turns)
+            texels = texels._replace(radiance=mean(texels.directions, texel_roughness(texels.solid_angles)))
         cells = self._cells_of(texels)
         return CellLight(sparse_product(cells.means, texels.radiance), self.directions, cells.solid_angles)
-
-    @staticmethod
-    def _blur(texels: LightTexels) -> Tensor:
-        """[t, 1] the roughness whose lobe has a texel's solid angle."""
-        return torch.full_like(texels.solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(texels.directions)))
 
     @torch.no_grad()
     def _cells_of(self, texels: LightTexels) -> Cells:

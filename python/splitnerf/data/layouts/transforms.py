@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.json_files import need, read_json
-from splitnerf.data.layouts.frame import Frame, checked_pose, listed_file, listed_image
+from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
 from splitnerf.errors import InputError
@@ -207,7 +207,7 @@ def _read_turn(matrix: object, index: int, path: Path) -> np.ndarray | None:
         turn = np.array(matrix, np.float64)
     except (ValueError, TypeError, OverflowError):
         turn = np.empty(0)
-    if turn.shape != (3, 3) or not np.abs(turn.T @ turn - np.eye(3)).max() < 1e-3 or np.linalg.det(turn) < 0:
+    if turn.shape != (3, 3) or not np.abs(turn.T @ turn - np.eye(3)).max() < RIGID_TOLERANCE or np.linalg.det(turn) < 0:
         raise InputError(f"{path}: 'light_rotation' of frame {index} must be a rotation, 3 x 3; repair it")
     return turn
 
