@@ -1,8 +1,7 @@
 """The operators in plain torch, one function each, as one would write them without this library.
 
-Tests compare the operators with these functions, benchmarks time both, and ``bench/plain_torch.py`` makes a whole training
-step of them. Each function has the arguments of ``torch.ops.splitnerf.NAME``, in float32 or float64, and
-returns its results, except those that only the backward pass reads.
+Tests compare the operators with these functions, and benchmarks time both. Each function has the arguments of
+``torch.ops.splitnerf.NAME``, in float32 or float64, and returns its results, except those that only the backward pass reads.
 """
 
 from __future__ import annotations

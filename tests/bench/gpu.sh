@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests, times and trains on a machine with one GPU and no network. Nothing is built there.
 #   tests/bench/gpu.sh OUT BUNDLE PART ...
-# PARTS: step steady operators paper fast memcheck racecheck tests. OUT receives table.md, a line for each part, log.txt and the parts' own
+# PARTS: step paper fast memcheck racecheck tests. OUT receives table.md, a line for each part, log.txt and the parts' own
 # pages. BUNDLE is what gpu_bundle.sh made; with - the package is installed already. A part that fails or takes too long is a line of
 # the table, and the next one begins.
 #   PYTHON=python3        has torch
@@ -20,9 +20,9 @@ python=$(command -v "${PYTHON:-python3}") dry=${GPU_DRY:-} work=${GPU_WORK:-${TM
 mkdir -p "$work" && work=$(cd "$work" && pwd) || exit 2
 export PATH="$work/venv/bin:$PATH:/usr/local/cuda/bin" PYTHONPYCACHEPREFIX="$work/pycache" PYTHONUNBUFFERED=1
 run_python=$work/venv/bin/python seconds=${PART_SECONDS:-140}
-device=cuda picture="size=200" before=200 steps=20000 until=1500 until_paper=300 small=()
+device=cuda picture="size=200" small=() limit=(--max-minutes "$(awk "BEGIN { print ($seconds - 25) / 60 }")")
 if [ -n "$dry" ]; then
-  device=cpu picture="size=24, n_train=6, n_test=2, spp=4" before=6 steps=40 until=12 until_paper=6 seconds=600
+  device=cpu picture="size=24, n_train=6, n_test=2, spp=4" seconds=600 limit=(--steps 40)
   small=(--set max_rays=64 --set log2_table_size=10 --set grid_resolution=16 --set mesh_resolution=24 --set light_resolution=16
     --set target_samples=256 --set initial_rays=64 --set light_samples=64 --set light_queries=64)
 fi
@@ -70,7 +70,7 @@ from splitnerf_tools.demo.scene import write_demo_dataset
 write_demo_dataset(Path('$work/writing'), $picture)" && mv "$work/writing" "$work/demo" && echo "$work/demo"
 }
 
-tests() { # each file in a process of its own: a kernel that takes the device down fails one file alone; before it a tool, if any
+tests() { # of some files, each in a process of its own, as a kernel may take the device down; before it a tool, if any
   local failed=0
   for file in $(grep -lE 'DEVICES|devices\(|"cuda"' tests/python/test_*.py); do
     CUDA_LAUNCH_BLOCKING=1 "$@" "$run_python" -m pytest "$file" -q -k "$device" -p no:cacheprovider -o faulthandler_timeout=60 -r fE || [ $? = 5 ] || failed=$((failed + 1))
@@ -80,8 +80,9 @@ tests() { # each file in a process of its own: a kernel that takes the device do
 }
 export python run_python work bundle picture device SPLITNERF_DATA="${SPLITNERF_DATA:-}"
 
-train() { # name, preset, options
-  part "$1" "$run_python" tests/bench/gpu_train.py "$scene" --out "$work/runs/$1" --device $device --preset "$2" --steps $steps "${small[@]}" "${@:3}"
+train() { # preset: as long as the part has time for; steps a second and memory stand in metrics.jsonl
+  part "$1" "$run_python" -m splitnerf train "$scene" --out "$work/runs/$1" --overwrite --device $device --preset "$1" "${limit[@]}" "${small[@]}"
+  [ ! -f "$work/runs/$1/metrics.jsonl" ] || cp "$work/runs/$1/metrics.jsonl" "$out/$1.jsonl"
 }
 
 cd "$root" || exit 2
@@ -96,11 +97,8 @@ part setup bash -c setup && part data bash -c data || exit 1
 scene=$(tail -n 1 "$work/data.log") failures=0
 for name in "$@"; do
   case $name in
-    step) part step "$run_python" tests/bench/gpu_step.py "$scene" --device $device --steps 12 --out "$out" "${small[@]}" ;;
-    steady) train steady fast --until $until --page "$out/steady.md" --set levels_open_by=0 --set mesh.every=0.02 ;;
-    operators) part operators "$run_python" tests/bench/gpu_ops.py "$scene" --out "$out" --device $device --steps $before "${small[@]}" ;;
-    paper) train paper paper --until $until_paper --profiled 10 --page "$out/paper.md" --set mesh.every=1.0 ;;
-    fast) train fast fast --set run.max_minutes="$(awk "BEGIN { print ($seconds - 25) / 60 }")" ;;
+    step) part step "$run_python" -m pytest tests/python/test_gpu_step.py -q -k $device -p no:cacheprovider ;;
+    paper | fast) train "$name" ;;
     memcheck | racecheck) part "$name" bash -c "tests compute-sanitizer --tool $name --error-exitcode 9" ;;
     tests) part tests bash -c tests ;;
     *) echo "no part is called $name" >&2; false ;;

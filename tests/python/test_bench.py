@@ -20,23 +20,7 @@ from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdow
 from splitnerf_tools.bench.harness import interleaved
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf_tools.bench.subjects import MapLight, pyramid_of
-from splitnerf_tools.demo.scene import write_demo_dataset
 from torch.nn import functional as F
-
-SMALL = [
-    "n_levels=2",
-    "log2_table_size=8",
-    "initial_rays=32",
-    "grid_resolution=16",
-    "light_resolution=16",
-    "light_queries=8",
-    "eikonal_points=16",
-    "mesh_resolution=16",
-    "export_resolution=16",
-    "export_faces=200",
-    "export_texture_size=32",
-    "refinement.enabled=false",
-]
 
 
 def point(name: str, cost: float, error: float, default: bool = False) -> Point:
@@ -117,8 +101,8 @@ def test_commands_hold_no_path_of_the_machine(monkeypatch):
     assert provenance.command_line() == "splitnerf ablate chair --rows 'a; b'"
     monkeypatch.setattr("sys.argv", [".venv/bin/splitnerf", "bench"])
     assert provenance.command_line() == "splitnerf bench"
-    monkeypatch.setattr("sys.argv", ["tests/bench/gpu_ops.py", "--out"])
-    assert provenance.command_line() == "tests/bench/gpu_ops.py --out"
+    monkeypatch.setattr("sys.argv", ["tests/bench/limits.py", "--out"])
+    assert provenance.command_line() == "tests/bench/limits.py --out"
 
 
 def test_errors_are_refused_before_they_are_timed():
@@ -294,15 +278,3 @@ def test_the_path_tracer_converges(tmp_path, monkeypatch):
 
 def test_time_to_an_error_follows_the_curve():
     assert path_tracer.time_to([(1.0, 0.1), (4.0, 0.05), (16.0, 0.025)], 0.0125) == pytest.approx(64)
-
-
-def test_a_training_step_in_plain_torch(tmp_path):
-    """The whole step with every operator replaced, before and after there is a mesh to be seen."""
-    data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
-    settings = [*SMALL, "target_samples=128", "max_rays=32", "mesh_every=0.3", "preview_every=2.0"]
-    script = Path(__file__).parents[1] / "bench" / "plain_torch.py"
-    command = [sys.executable, script, data, "--steps", "6", *(word for s in settings for word in ("--set", s))]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr[-2000:]
-    ours, plain, ratio = done.stdout.splitlines()
-    assert "ms a step, median of 5" in ours and plain.startswith("plain torch") and ratio.endswith("x")
