@@ -30,9 +30,9 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image, write_image
-from splitnerf.data.layouts import stanford_orb
 from splitnerf.data.truth import load_view_truths, read_mesh
 from splitnerf.errors import InputError
+from splitnerf.evaluate.published import stanford_orb
 
 ENDLESS = 10**400
 Damage = Callable[[Path], object]  # changes a folder; gives the path to be read where the form is one of files
@@ -517,7 +517,7 @@ FORMS = {  # what writes a good folder, what reads it or the path that the damag
     "COLMAP, binary": (lambda root: write_colmap(root, binary=True), load, COLMAP | BINARY),
     "COLMAP, text": (lambda root: write_colmap(root, binary=False), load, COLMAP),
     "NeuS": (write_neus, load, NEUS),
-    "Stanford-ORB": (write_capture, lambda root, _: stanford_orb.relit(root / "a", {}), STANFORD_ORB),
+    "Stanford-ORB": (write_capture, lambda root, _: stanford_orb.relit(root / "a"), STANFORD_ORB),
     "image": (write_images, of_file(read_image), IMAGES),
     "map": (Path.exists, of_file(read_environment), MAPS),
     "mesh": (Path.exists, of_file(read_mesh), MESHES),

@@ -8,11 +8,10 @@ import trimesh
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.layouts.lit import LitView
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import nerfactor, shiny, stanford_orb, tensoir
-from splitnerf.evaluate.published.common import Delivered
-from splitnerf.evaluate.published.folders import FolderTruth
+from splitnerf.evaluate.published import stanford_orb, views
+from splitnerf.evaluate.published.common import Delivered, LitView
+from splitnerf.evaluate.published.views import FolderTruth
 
 SIDE = 24
 RANDOM = np.random.default_rng(5)
@@ -88,44 +87,47 @@ def test_orb_normals_and_chamfer():
 def test_nerfactor_scale_is_of_least_squares_on_opaque_pixels():
     truth, alpha = picture(), np.where(box(4, 20) > 0, 1.0, 0.85)
     ours = np.where(alpha[..., None] > 0.9, truth / [2.0, 0.5, 1.25], 9.0)
-    assert nerfactor.albedo_scale({"albedo": ours}, truth, alpha) == pytest.approx([2.0, 0.5, 1.25])
+    assert views.opaque_scale({"albedo": ours}, FolderTruth(None, alpha, truth, None)) == pytest.approx(
+        [2.0, 0.5, 1.25]
+    )
 
 
 def test_nerfactor_takes_four_views_of_the_test():
     def view(number: int) -> LitView:
         return LitView(Frame(f"test_{number:03d}", None, np.eye(4), {}), "city", None)
 
-    names = [v.frame.name for v in nerfactor.chosen([view(i) for i in range(200)], None)]
+    names = [v.frame.name for v in views.chosen([view(i) for i in range(200)], None)]
     assert names == ["test_049", "test_099", "test_149", "test_199"]
     with pytest.raises(InputError, match="none of the test views 49, 99, 149, 199"):
-        nerfactor.chosen([view(3)], None)
+        views.chosen([view(3)], None)
 
 
 def test_tensoir_albedo_is_to_the_power_and_white_outside():
     alpha = (box(6, 18) > 0).astype(float)
     truth = FolderTruth(None, alpha, np.full((SIDE, SIDE, 3), 0.36), None)
     maps = {"albedo": np.full((SIDE, SIDE, 3), 0.18), "alpha": alpha}
-    assert tensoir.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
+    assert views.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
     bright = {"albedo": np.full((SIDE, SIDE, 3), 0.72), "alpha": alpha}
-    assert tensoir.albedo_error(bright, truth, np.full(3, 0.5)) == pytest.approx(0, abs=1e-12)
+    assert views.albedo_error(bright, truth, np.full(3, 0.5)) == pytest.approx(0, abs=1e-12)
     expected = alpha.mean() * (0.36 ** (1 / 2.2) - 0.18 ** (1 / 2.2)) ** 2
-    assert tensoir.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
+    assert views.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
 
 
 def test_tensoir_normals_count_the_background_as_equal():
     alpha = box(0, 12)
     up, side = (np.broadcast_to(np.array(n, float), (SIDE, SIDE, 3)) for n in ((0, 0, 1), (1, 0, 0)))
-    found = tensoir.whole_normals({"normal": side, "alpha": alpha}, FolderTruth(None, alpha, None, up))
+    found = views.whole_normals({"normal": side, "alpha": alpha}, FolderTruth(None, alpha, None, up))
     assert found == pytest.approx(90 * alpha.mean())
     nothing = {"normal": side, "alpha": np.zeros_like(alpha)}  # shows the background where the truth points down
-    assert tensoir.whole_normals(nothing, FolderTruth(None, alpha, None, -up)) == pytest.approx(180 * alpha.mean())
+    assert views.whole_normals(nothing, FolderTruth(None, alpha, None, -up)) == pytest.approx(180 * alpha.mean())
 
 
 def test_shiny_normals_are_weighted():
     up, side = (np.broadcast_to(np.array(n, float), (2, 2, 3)) for n in ((0, 0, 1), (0, 1, 0)))
     mixed = np.where(np.array([[[True], [False]], [[False], [False]]]), side, up)
-    assert shiny.weighted_angle(mixed, up, np.array([[3.0, 1], [0, 2]])) == pytest.approx(45)
-    assert shiny.weighted_angle(mixed, up, np.zeros((2, 2))) is None
+    maps, truth = {"normal": mixed, "alpha": np.array([[3.0, 1], [0, 2]])}, FolderTruth(None, np.ones((2, 2)), None, up)
+    assert views.weighted_angle(maps, truth) == pytest.approx(45)
+    assert views.weighted_angle(maps | {"alpha": np.zeros((2, 2))}, truth) is None
 
 
 def test_albedo_is_scaled_before_relighting():

@@ -11,7 +11,7 @@ from splitnerf.data.asset import Asset, Material
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import shiny, stanford_orb
+from splitnerf.evaluate.published import stanford_orb, views
 from splitnerf.evaluate.published.common import Delivered, Options
 
 SIDE = 16
@@ -69,11 +69,11 @@ def test_orb_takes_linear_photos_for_captures_in_8_bits(tmp_path):
     photo = picture(most=3.0)
     root = capture(tmp_path / "blender_LDR/a_scene001", ".png", linear_to_srgb(photo.clip(0, 1)))
     scores = stanford_orb.score(Painted(photo), root, Options())
-    assert scores.means["view_psnr_h"] is None and scores.means["view_psnr_l"] > 25
+    assert scores.images[0]["view_psnr_h"] is None and scores.images[0]["view_psnr_l"] > 25
     assert scores.notes == ["no PSNR-H: blender_HDR with the photos' EXR files is not next to the data's folder"]
     capture(tmp_path / "blender_HDR/a_scene001", ".exr", photo)
     scores = stanford_orb.score(Painted(photo), root, Options())
-    assert scores.means["view_psnr_h"] > 50 and scores.notes == []
+    assert scores.images[0]["view_psnr_h"] > 50 and scores.notes == []
 
 
 def test_orb_has_no_score_of_an_empty_mask():
@@ -96,7 +96,7 @@ def test_photos_of_the_training_are_not_held_out(tmp_path):
     write_image(tmp_path / "a.png", np.dstack([picture(), np.ones((SIDE, SIDE))]))
     transforms(tmp_path, {"transforms.json": ["a.png"]})
     with pytest.raises(InputError, match="lists no test views; give a folder with transforms_test.json"):
-        shiny.score(Painted(picture()), tmp_path, Options())
+        views.shiny(Painted(picture()), tmp_path, Options())
 
 
 @pytest.mark.parametrize("changes", [{"k1": 0.1}, {"mask_path": "a.png"}, {"exposure": 2.0}, None])
@@ -104,8 +104,8 @@ def test_photos_of_another_form_are_refused(changes, tmp_path):
     photo = picture() if changes is None else np.dstack([picture(), np.ones((SIDE, SIDE))])
     write_image(tmp_path / "a.png", photo)
     transforms(tmp_path, {"transforms_train.json": ["a.png"], "transforms_test.json": ["a.png"]}, **(changes or {}))
-    with pytest.raises(InputError, match="has no alpha" if changes is None else "distortion, a mask or a curve"):
-        shiny.score(Painted(picture()), tmp_path, Options())
+    with pytest.raises(InputError, match="needs an alpha" if changes is None else "distortion, a mask or a curve"):
+        views.shiny(Painted(picture()), tmp_path, Options())
 
 
 def test_colours_of_vertices_take_the_factor():

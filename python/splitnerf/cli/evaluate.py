@@ -183,8 +183,7 @@ def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
     ones."""
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.published.common import Options
-    from splitnerf.evaluate.published.scoring import published_path, score_published
-    from splitnerf.evaluate.published.values import table
+    from splitnerf.evaluate.published.scoring import published_path, score_published, table
     from splitnerf.evaluate.scoring import is_asset
 
     if args.env is not None and not is_asset(target):

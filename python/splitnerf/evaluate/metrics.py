@@ -87,11 +87,15 @@ def median_scale(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return np.median(truth / np.maximum(np.asarray(prediction, np.float64), 1e-6), axis=0)
 
 
-def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
-    """Mean angle in degrees between unit normals [m, 3], stable near 0 and 180: 2 atan2(|a - b|, |a + b|)."""
+def angles_deg(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """[...] angles in degrees between unit vectors [..., 3], stable near 0 and 180: 2 atan2(|a - b|, |a + b|)."""
     a, b = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
-    angles = 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
-    return float(np.degrees(angles).mean())
+    return np.degrees(2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)))
+
+
+def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
+    """Mean angle in degrees between unit normals [m, 3]."""
+    return float(angles_deg(prediction, truth).mean())
 
 
 def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray, threshold: float = 0.5) -> float:

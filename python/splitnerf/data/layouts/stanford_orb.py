@@ -17,10 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.json_files import need
 from splitnerf.data.layouts import transforms
-from splitnerf.data.layouts.frame import Frame, folder_name
-from splitnerf.data.layouts.lit import LitView, map_in_world
+from splitnerf.data.layouts.frame import Frame
 
 NOVEL = "transforms_novel.json"
 HDR = "blender_HDR"  # the folder of the captures with linear photos
@@ -37,29 +35,7 @@ splits = transforms.splits
 
 def read(root: Path, split: str | None) -> list[Frame]:
     """The frames of a split, or all. Raises InputError where a file is missing or cannot be used."""
-    return [_with_mask(frame) for frame in transforms.read(root, split)]
-
-
-def relit(root: Path, maps: dict[str, Path], truth: Path | None = None) -> list[LitView]:
-    """The photos of `transforms_novel.json` with their lights; `maps` is not needed, `truth` is the folder `ground_truth` where it
-    lies elsewhere.
-
-    Raises:
-        InputError: A file is missing or cannot be used.
-    """
-    path, views = root / NOVEL, []
-    meta, entries = transforms.read_entries(path)
-    for index, entry in enumerate(entries):
-        scene = folder_name(
-            need(entry, "scene_name", path, f" in frame {index}"), f"{path}: 'scene_name' of frame {index}"
-        )
-        frame = _with_mask(transforms.read_frame(entry, meta, index, path, root.absolute().parent / scene))
-        turn = MAP_FROM_CAMERA @ frame.pose[:3, :3].T
-        light = (
-            (ground_truth(root, scene) if truth is None else truth / scene) / "env_map" / f"{frame.image_path.stem}.exr"
-        )
-        views.append(LitView(frame, scene, map_in_world(light, turn)))
-    return views
+    return [with_mask(frame) for frame in transforms.read(root, split)]
 
 
 def ground_truth(root: Path, scene: str | None = None) -> Path:
@@ -67,7 +43,8 @@ def ground_truth(root: Path, scene: str | None = None) -> Path:
     return root.absolute().parents[1] / "ground_truth" / (root.absolute().name if scene is None else scene)
 
 
-def _with_mask(frame: Frame) -> Frame:
+def with_mask(frame: Frame) -> Frame:
+    """The frame with the mask that lies in the folder beside its photo's."""
     image = frame.image_path
     return replace(
         frame, mask_path=image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png", mask_kind="object"

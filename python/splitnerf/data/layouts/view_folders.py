@@ -12,12 +12,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import Frame, checked_pose
-from splitnerf.data.layouts.lit import LitView, map_in_world
 from splitnerf.data.lens import read_lens
 from splitnerf.errors import InputError
 from splitnerf.files import is_file
@@ -52,26 +50,6 @@ def read(root: Path, split: str | None) -> list[Frame]:
 def read_others(root: Path, prefix: str) -> list[Frame]:
     """The views `PREFIX_000` ... of a prefix that is no split, such as `val`, by number; those without a photo left out."""
     return [_read_view(folder) for folder in _folders(root, prefix) if is_file(folder / PHOTO)]
-
-
-def relit(root: Path, maps: dict[str, Path]) -> list[LitView]:
-    """The test views in the lights of maps, as far as there are photos `rgba_NAME.png`.
-
-    Raises:
-        InputError: There is none, or a file cannot be used.
-    """
-    views = []
-    for frame in read(root, "test"):
-        for name, path in maps.items():
-            image = frame.image_path.with_name(f"{frame.image_path.stem}_{name}.png")
-            if is_file(image):
-                views.append(LitView(replace(frame, image_path=image), name, map_in_world(path)))
-    if not views:
-        names = ", ".join(maps) or "no map"
-        raise InputError(
-            f"{root}: no test view has a photo under {names}; give --maps the folder of the set's test lights"
-        )
-    return views
 
 
 def parse_matrix(text: object) -> object:

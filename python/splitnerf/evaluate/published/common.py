@@ -1,16 +1,16 @@
-"""Shared by the protocols of published sets: the delivered asset, its renderings at a set's cameras, and the scores."""
+"""Shared by the protocols of published sets: options, lights, the delivered asset at a set's cameras, and the scores."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from splitnerf.data.asset import Asset, Material
-from splitnerf.data.images import linear_to_srgb, read_header
+from splitnerf.data.environment import MAP_ROWS, read_environment, resize_environment, turn_environment
+from splitnerf.data.images import read_header
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.errors import InputError
@@ -18,8 +18,6 @@ from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.relight import FIRST_SEED
 from splitnerf.evaluate.similarity import image_scores
 from splitnerf.render.path_traced import MOST_SPP, MOST_VIEWS, AssetRenderer
-
-Column = tuple[str, str, str]  # key, title, format
 
 
 @dataclass(frozen=True)
@@ -54,14 +52,42 @@ class Scores:
     """The scores of a protocol.
 
     Attributes:
-        means: The numbers of the table by key; None where the data hold no truth.
-        images: The numbers of each image, with its name.
+        images: The numbers of each image by key, with its name.
         notes: Restrictions of the scores, for the reader.
+        means: Numbers of the table that are not the means over the images.
     """
 
-    means: dict[str, float | None]
-    images: list[dict] = field(default_factory=list)
+    images: list[dict]
     notes: list[str] = field(default_factory=list)
+    means: dict[str, float | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LitView:
+    """One photo in a known light.
+
+    Attributes:
+        frame: The photo.
+        light: The light's name.
+        radiance: Reads the light: [h, w, 3] linear radiance, equirectangular, in the data's world as
+            :func:`splitnerf.data.environment.read_environment` has it.
+    """
+
+    frame: Frame
+    light: str
+    radiance: Callable[[], np.ndarray]
+
+
+def light_of(path: Path, turn: np.ndarray | None = None) -> Callable[[], np.ndarray]:
+    """Reads a map, at most 512 rows of it, when it is called; `turn` [3, 3] is the rotation from the data's world to the map's."""
+
+    def read() -> np.ndarray:
+        radiance = read_environment(path)
+        if radiance.shape[0] > MAP_ROWS:
+            radiance = resize_environment(radiance, MAP_ROWS, 2 * MAP_ROWS)
+        return radiance if turn is None else turn_environment(radiance, turn)
+
+    return read
 
 
 class Delivered:
@@ -117,13 +143,6 @@ def _scaled(material: Material, scale: np.ndarray) -> Material:
     return replace(material, albedo=(1.0, 1.0, 1.0), albedo_texture=texture)
 
 
-def srgb_on_white(maps: dict[str, np.ndarray]) -> np.ndarray:
-    """[H, W, 3] the image of a rendering, clipped, in sRGB over white, composited as image viewers do."""
-    alpha = maps["alpha"][..., None]
-    straight = linear_to_srgb(np.clip(maps["radiance"] / np.maximum(alpha, 1e-8), 0, 1))
-    return straight * alpha + 1 - alpha
-
-
 def compared(image: np.ndarray, truth: np.ndarray, options: Options, prefix: str = "") -> dict[str, float | None]:
     """PSNR, SSIM and LPIPS of sRGB images [H, W, 3] in [0, 1], by keys with a prefix."""
     return {f"{prefix}{key}": value for key, value in image_scores(image, truth, options.distance).items()}
@@ -132,27 +151,3 @@ def compared(image: np.ndarray, truth: np.ndarray, options: Options, prefix: str
 def unit(vectors: np.ndarray) -> np.ndarray:
     """Vectors [..., 3] of length 1; 0 stays 0."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-8)
-
-
-def angles_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """[...] the angles in degrees between unit vectors [..., 3], stable near 0 and 180."""
-    return np.degrees(2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)))
-
-
-def mean_of(images: Sequence[dict], key: str) -> float | None:
-    """The mean of a number over the images that have it; None where none has."""
-    values = [image[key] for image in images if image.get(key) is not None]
-    return float(np.mean(values)) if values else None
-
-
-def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """[n] the distance from each of points [n, 3] to the nearest of targets [m, 3].
-
-    Raises:
-        InputError: One of them is empty.
-    """
-    if not len(points) or not len(targets):
-        raise InputError(
-            "nothing is left to compare: the mesh and the truth do not show the same place; check the data"
-        )
-    return cKDTree(targets).query(points)[0]

@@ -1,21 +1,70 @@
-"""Scores a run or an asset's file by the protocol of a published set."""
+"""Scores a run or an asset's file by the protocol of a published set; `numbers.json` holds what was published."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
 
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json
+from splitnerf.data.layouts import stanford_orb as orb_layout
+from splitnerf.data.layouts import transforms, view_folders
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.evaluate.asset import environment_beside
 from splitnerf.evaluate.lpips import find_distance
-from splitnerf.evaluate.published.common import Delivered, Options
-from splitnerf.evaluate.published.values import PROTOCOLS, published
+from splitnerf.evaluate.published import stanford_orb, views
+from splitnerf.evaluate.published.common import Delivered, Options, Scores
 from splitnerf.evaluate.scoring import is_asset
+
+Column = tuple[str, str, str]  # key, title, format
+NUMBERS = Path(__file__).with_name("numbers.json")
+
+
+class Protocol(NamedTuple):
+    """The rules of a published set.
+
+    Attributes:
+        layout: The layout that its data have, a module of :mod:`splitnerf.data.layouts`.
+        columns: The columns of its table, the headline first.
+        score: Path-traces an asset and compares it with the data in a folder. Raises InputError with one line where these do
+            not hold what the protocol needs.
+    """
+
+    layout: ModuleType
+    columns: tuple[Column, ...]
+    score: Callable[[Delivered, Path, Options], Scores]
+
+
+def _similarity(prefix: str, title: str) -> tuple[Column, ...]:
+    forms = ("psnr", "{:.2f}"), ("ssim", "{:.3f}"), ("lpips", "{:.3f}")
+    return tuple((f"{prefix}{key}", f"{title}, {key.upper()}", form) for key, form in forms)
+
+
+RELIT, ALBEDO, NOVEL = _similarity("", "relit"), _similarity("albedo_", "albedo"), _similarity("view_", "novel")
+NORMALS: Column = ("normals", "normals, degrees", "{:.2f}")
+ORB = (
+    ("psnr_h", "relit, PSNR-H", "{:.2f}"),
+    ("psnr_l", "relit, PSNR-L", "{:.2f}"),
+    ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
+    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"),
+    ("normals", "normals, 1 - cos", "{:.3f}"),
+    ("chamfer", "chamfer, 2e3", "{:.2f}"),
+)
+PROTOCOLS = {
+    "stanford-orb": Protocol(orb_layout, ORB, stanford_orb.score),
+    "nerfactor": Protocol(view_folders, (*RELIT, *ALBEDO, NOVEL[0], NORMALS), views.nerfactor),
+    "tensoir": Protocol(view_folders, (*RELIT, ALBEDO[0], *NOVEL, NORMALS), views.tensoir),
+    "shiny": Protocol(transforms, (*NOVEL, NORMALS), views.shiny),
+}
 
 
 def score_published(target: Path, data: Path, name: str, options: Options, env: Path | None = None) -> dict:
@@ -24,19 +73,20 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
     Args:
         target: The run or the file, in the data's world frame.
         data: The folder that was trained on.
-        name: One of :data:`splitnerf.evaluate.published.values.PROTOCOLS`.
+        name: One of :data:`PROTOCOLS`.
         options: Paths a pixel, and the folders of lights and truth.
         env: The light of the photos for novel views; None for the environment.exr or .hdr in its folder.
 
     Returns:
-        `protocol`, `scores` by key, `images` with those of each, `notes`, `published` and `spp`.
+        `protocol`, `scores` by key (None where the data hold no truth), `images` with those of each, `notes`, `published` and
+        `spp`.
 
     Raises:
         InputError: A file cannot be used, or the data are not of the protocol's set.
     """
     protocol = PROTOCOLS[name]
-    if layout_of(data) is not protocol.LAYOUT:
-        where = protocol.LAYOUT.__name__.rsplit(".", 1)[1]
+    if layout_of(data) is not protocol.layout:
+        where = protocol.layout.__name__.rsplit(".", 1)[1]
         raise InputError(f"{data}: does not look like {name}'s data (see {where} in docs/data.md); give their folder")
     path = target if is_asset(target) else target / "mesh.glb"
     if not path.is_file():
@@ -45,20 +95,37 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
     _, origin = read_frames(data, "train", Reading("all"))
     delivered = Delivered(read_asset(path), None if env is None else read_environment(env), origin, options.spp)
     missing = ""
-    if any("lpips" in key for key, _, _ in protocol.COLUMNS):
+    if any("lpips" in key for key, _, _ in protocol.columns):
         distance, missing = find_distance()
         options = replace(options, distance=distance)
     scores = protocol.score(delivered, data, options)
-    if missing:
-        scores.notes.append(f"LPIPS was not computed: {missing}")
     return {
         "protocol": name,
-        "scores": scores.means,
+        "scores": {key: _mean(scores.images, key) for key, _, _ in protocol.columns} | scores.means,
         "images": scores.images,
-        "notes": scores.notes,
+        "notes": scores.notes + ([f"LPIPS was not computed: {missing}"] if missing else []),
         "published": published(name),
         "spp": options.spp,
     }
+
+
+def published(name: str) -> dict:
+    """The published scores of a protocol: `source`, `date`, and `rows`, each with `method` and some of the columns'
+    keys."""
+    return json.loads(NUMBERS.read_text(encoding="utf-8")).get(name, {"source": None, "date": None, "rows": []})
+
+
+def table(name: str, ours: dict[str, float | None], label: str) -> str:
+    """Our scores above the published ones, as lines of text, without empty columns."""
+    rows = [({"method": label} | ours), *published(name)["rows"]]
+    columns = [column for column in PROTOCOLS[name].columns if any(row.get(column[0]) is not None for row in rows)]
+    cells = [["", *(title for _, title, _ in columns)]]
+    for row in rows:
+        values = (row.get(key) for key, _, _ in columns)
+        cells.append([row["method"], *("-" if x is None else f.format(x) for x, (_, _, f) in zip(values, columns))])
+    widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))]
+    padded = [[cell.rjust(width) for cell, width in zip(line, widths)] for line in cells]
+    return "\n".join("  ".join([line[0].ljust(widths[0]), *rest[1:]]).rstrip() for line, rest in zip(cells, padded))
 
 
 def holds_published(path: Path) -> bool:
@@ -73,3 +140,8 @@ def holds_published(path: Path) -> bool:
 def published_path(target: Path, name: str) -> Path:
     """The file of a protocol's scores: in the run's folder, or next to the asset's file."""
     return target.with_name(f"{target.stem}_{name}.json") if is_asset(target) else target / f"{name}.json"
+
+
+def _mean(images: list[dict], key: str) -> float | None:
+    values = [image[key] for image in images if image.get(key) is not None]
+    return float(np.mean(values)) if values else None

@@ -12,27 +12,28 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scipy.ndimage import binary_erosion
+from scipy.spatial import cKDTree
 
-from splitnerf.data.images import HDR_SUFFIXES, area_average, linear_to_srgb, read_header
+from splitnerf.data.images import (
+    HDR_SUFFIXES,
+    LDR_SUFFIXES,
+    area_average,
+    linear_to_srgb,
+    read_header,
+    read_image,
+    srgb_to_linear,
+)
+from splitnerf.data.json_files import need
 from splitnerf.data.layouts import stanford_orb as layout
-from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.layouts.lit import read_lit_photo
+from splitnerf.data.layouts import transforms
+from splitnerf.data.layouts.frame import Frame, folder_name
 from splitnerf.data.truth import read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import lsq_scale, psnr
-from splitnerf.evaluate.published.common import Column, Delivered, Options, Scores, mean_of, nearest, unit
+from splitnerf.evaluate.published.common import Delivered, LitView, Options, Scores, light_of, unit
 from splitnerf.files import is_file
 from splitnerf.progress import tracked
 
-LAYOUT = layout
-COLUMNS: tuple[Column, ...] = (
-    ("psnr_h", "relit, PSNR-H", "{:.2f}"),
-    ("psnr_l", "relit, PSNR-L", "{:.2f}"),
-    ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
-    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"),
-    ("normals", "normals, 1 - cos", "{:.3f}"),
-    ("chamfer", "chamfer, 2e3", "{:.2f}"),
-)
 SIDE = 512  # pixels at which images are compared
 EROSION = np.ones((5, 5), bool)
 BRIGHTEST = 4.0  # where PSNR-H clips
@@ -43,7 +44,7 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
     """Scores the photos of `transforms_novel.json` and `transforms_test.json`, the normals of the latter, and the
     mesh."""
     images, notes = [], []
-    views = layout.relit(root, {}, options.truth) if (root / layout.NOVEL).is_file() else []
+    views = relit(root, options.truth) if (root / layout.NOVEL).is_file() else []
     for view in tracked(views, "relit, image"):
         frame = with_radiance(view.frame)
         maps, photo, mask = _pair(delivered, frame, view.radiance())
@@ -58,8 +59,56 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
         if not _is_hdr(frame) and not notes:
             notes.append(f"no PSNR-H: {layout.HDR} with the photos' EXR files is not next to the data's folder")
         images.append(result)
-    means = {key: mean_of(images, key) for key, _, _ in COLUMNS} | {"chamfer": _chamfer(delivered, root, options)}
-    return Scores(means, images, notes)
+    return Scores(images, notes, {"chamfer": _chamfer(delivered, root, options)})
+
+
+def relit(root: Path, truth: Path | None = None) -> list[LitView]:
+    """The photos of `transforms_novel.json` with their lights; `truth` is the folder `ground_truth` where it lies elsewhere.
+
+    Raises:
+        InputError: A file is missing or cannot be used.
+    """
+    path, views = root / layout.NOVEL, []
+    meta, entries = transforms.read_entries(path)
+    for i, entry in enumerate(entries):
+        scene = folder_name(need(entry, "scene_name", path, f" in frame {i}"), f"{path}: 'scene_name' of frame {i}")
+        frame = layout.with_mask(transforms.read_frame(entry, meta, i, path, root.absolute().parent / scene))
+        folder = layout.ground_truth(root, scene) if truth is None else truth / scene
+        turn = layout.MAP_FROM_CAMERA @ frame.pose[:3, :3].T
+        views.append(LitView(frame, scene, light_of(folder / "env_map" / f"{frame.image_path.stem}.exr", turn)))
+    return views
+
+
+def read_lit_photo(frame: Frame, factor: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Reads the photo of a pinhole at an exposure of 1.
+
+    Args:
+        frame: The frame.
+        factor: Linear values and masks are averaged down by this integer.
+
+    Returns:
+        [H, W, 3] float32 linear radiance as the file has it (not multiplied by coverage), and [H, W] float32 the mask in
+        [0, 1]: of the mask's file, else alpha, else 1.
+
+    Raises:
+        InputError: A file is missing or cannot be used.
+    """
+    path = frame.image_path
+    if path.suffix.lower() not in LDR_SUFFIXES + HDR_SUFFIXES:
+        raise InputError(f"{path}: must be PNG, JPEG, EXR or HDR; convert it")
+    pixels = read_image(path)
+    if not np.isfinite(pixels).all():
+        raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
+    colour, mask = pixels[..., :3], np.ones(pixels.shape[:2], np.float32)
+    if not _is_hdr(frame):
+        colour = colour ** np.float32(frame.gamma) if frame.gamma else srgb_to_linear(colour)
+    if frame.mask_path is not None:
+        mask = read_image(frame.mask_path)[..., 0]
+        if mask.shape != pixels.shape[:2]:
+            raise InputError(f"{frame.mask_path}: has another size than {path.name}; make them the same size")
+    elif pixels.shape[2] == 4:
+        mask = pixels[..., 3]
+    return area_average(colour / np.float32(frame.exposure), factor), area_average(mask, factor)
 
 
 def with_radiance(frame: Frame) -> Frame:
@@ -121,7 +170,8 @@ def chamfer(mesh: trimesh.Trimesh, truth: np.ndarray) -> float:
     """2000 times the mean squared distance between points on a mesh and points [n, 3], averaged over both directions.
     This is the scale of the paper's table, twice the one that its text states."""
     points = np.asarray(trimesh.sample.sample_surface(mesh, SAMPLES, seed=0)[0])
-    return float(1e3 * ((nearest(truth, points) ** 2).mean() + (nearest(points, truth) ** 2).mean()))
+    near, far = cKDTree(points).query(truth)[0], cKDTree(truth).query(points)[0]
+    return float(1e3 * ((near**2).mean() + (far**2).mean()))
 
 
 def _pair(delivered: Delivered, frame: Frame, light: np.ndarray | None) -> tuple[dict, np.ndarray, np.ndarray]:
