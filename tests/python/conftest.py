@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 import trimesh
 from painted_ball import heights, photos, sky, textured
+from splitnerf.cli import DONE
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.refinement.texels import AssetTexels
-from splitnerf.training.loop import train
+from splitnerf.training.loop import Training, train
 from splitnerf_tools.demo.scene import write_demo_dataset
 from tiny_runs import tiny
+from tiny_runs import train as command_train
 from viewer_server import numbered_sky, serving, triangle
 
 
@@ -47,6 +50,20 @@ def data_with_mesh(data, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def trained_once(data, tmp_path_factory) -> Path:
+    """A run of 4 steps as `splitnerf train` leaves it."""
+    run = tmp_path_factory.mktemp("trained") / "run"
+    assert command_train(data, run, "--steps", "4") == DONE
+    return run
+
+
+@pytest.fixture
+def done(trained_once, tmp_path) -> Path:
+    """A copy of it, to be changed."""
+    return shutil.copytree(trained_once, tmp_path / "run")
+
+
 @pytest.fixture
 def begun(data, tmp_path) -> tuple[Path, bytes]:
     """A run of 8 steps, and its checkpoint."""
@@ -54,6 +71,17 @@ def begun(data, tmp_path) -> tuple[Path, bytes]:
     run.mkdir()
     train(load_dataset(data), tiny(steps=8), run)
     return run, (run / "checkpoint.pt").read_bytes()
+
+
+@pytest.fixture
+def at_step(monkeypatch) -> Callable[[int, Callable[[], object]], None]:
+    """A function that calls another when the given step of a training begins."""
+
+    def set_up(step: int, action: Callable[[], object]) -> None:
+        refresh = Training.refresh
+        monkeypatch.setattr(Training, "refresh", lambda self: (self.step == step and action(), refresh(self)))
+
+    return set_up
 
 
 @pytest.fixture(scope="session")

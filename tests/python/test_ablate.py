@@ -12,23 +12,7 @@ from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
 from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
 from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table, score_of
-from splitnerf_tools.demo.scene import write_demo_dataset
-
-SMALL = [
-    "n_levels=2",
-    "log2_table_size=8",
-    "target_samples=256",
-    "initial_rays=32",
-    "grid_resolution=16",
-    "light_resolution=16",
-    "light_queries=8",
-    "eikonal_points=16",
-    "mesh_resolution=16",
-    "export_resolution=16",
-    "export_faces=200",
-    "export_texture_size=32",
-    "refinement.enabled=false",
-]
+from tiny_runs import SMALL, as_options
 
 
 def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
@@ -133,11 +117,8 @@ def test_tables_hold_what_is_known():
     )
 
 
-def test_it_runs_and_goes_on(tmp_path, capsys):
-    data = write_demo_dataset(tmp_path / "tiny", size=16, n_train=4, n_test=1, spp=2)
-    (data / "mesh.ply").unlink()  # distances to a mesh as far off as this one's take long
-    command = ["ablate", str(data), "--out", str(tmp_path / "out"), "--steps", "6", "--spp", "1"]
-    command += [word for setting in SMALL for word in ("--set", setting)]
+def test_it_runs_and_goes_on(data, tmp_path, capsys):
+    command = ["ablate", str(data), "--out", str(tmp_path / "out"), "--steps", "6", "--spp", "1", *as_options(SMALL)]
     assert main([*command, "--rows", "no mask loss"]) == DONE
     runs = tmp_path / "out" / "tiny"
     assert {p.name for p in runs.iterdir()} == {"full", "no_mask_loss"}

@@ -1,12 +1,10 @@
-"""splitnerf batch on Ray: scenes that are killed, damaged and interrupted; who can reach it; what it leaves."""
+"""splitnerf batch on Ray: a damaged scene beside a good one; who can reach it; what it leaves."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -17,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from splitnerf.cli import BAD_INPUT, FAILED
 from splitnerf_tools.batch.scenes import known_scenes
 from tiny_runs import SMALL, as_options
 
@@ -152,15 +150,6 @@ def damage(scene: Path) -> None:
     path.write_text(path.read_text()[:100])
 
 
-def worker_of(run: Path) -> int | None:
-    """The worker of Ray's under which a run is trained, once it has a checkpoint."""
-    if not (run / "checkpoint.pt").is_file():
-        return None
-    trained = [number for number, words in commands().items() if f"--out {run} " in words and " batch " not in words]
-    tree = parents()
-    return next((tree[number] for number in trained if number in tree), None)
-
-
 def test_a_damaged_scene_stops_no_other_and_nobody_else_reaches_ray(data, tmp_path, call):
     good, bad = scenes_of(data, tmp_path / "scenes", "good", "bad")
     damage(bad)
@@ -190,41 +179,3 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
         asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers")
         and len(asked.err.splitlines()) == 1
     )
-
-
-@pytest.mark.slow
-def test_six_scenes_of_which_one_is_killed_and_one_damaged(data, tmp_path, call):
-    """And all are interrupted on their way; the same command goes on each time. Its last call does nothing."""
-    scenes = scenes_of(data, tmp_path / "scenes", "ball", "cup", "fox", "kettle", "pot", "vase")
-    damage(scenes[2])
-    out, good = tmp_path / "out", [scene for scene in scenes if scene.name != "fox"]
-    words = (*scenes, "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
-    first = call(*words)
-    os.kill(first.wait_until(lambda: worker_of(out / "ball")), signal.SIGKILL)
-    first.wait_until(
-        lambda: "splitnerf: note: ball: its worker was killed; it continues from its last checkpoint" in first.err
-    )
-    first.wait_until(lambda: sum((out / scene.name / "mesh.glb").exists() for scene in good) >= 2)
-    first.program.send_signal(signal.SIGINT)
-    assert first.end() == INTERRUPTED and "stopped; to continue, repeat the command." in first.out
-    assert not list(out.glob("*/lock")) and not list(out.rglob(".*"))
-    states = {scene.name: scene.state for scene in known_scenes(out)}
-    assert set(states.values()) <= {"done", "stopped", "waiting", "refused"} and "done" in states.values()
-    finished = {name: (out / name / "mesh.glb").stat().st_mtime_ns for name, state in states.items() if state == "done"}
-
-    second = call(*words)
-    assert second.end() == FAILED
-    print(second.out)
-    assert all((out / scene.name / name).is_file() for scene in good for name in ("mesh.glb", "environment.exr"))
-    assert finished == {name: (out / name / "mesh.glb").stat().st_mtime_ns for name in finished}
-    lines = (out / "ball/metrics.jsonl").read_text().splitlines()
-    assert [json.loads(line)["step"] for line in (lines[0], lines[-1])] == [1, 400]
-    assert second.out.count(" done ") == 5 and second.out.count("is not valid json") == 1 and not (out / "fox").exists()
-
-    before = {path: path.stat().st_mtime_ns for path in out.glob("*/*") if path.parent.name != "logs"}
-    third = call(*words)
-    assert third.end() == FAILED
-    assert sorted(third.out.splitlines()[1:7]) == sorted(second.out.splitlines()[1:7])
-    assert before == {path: path.stat().st_mtime_ns for path in out.glob("*/*") if path.parent.name != "logs"}
-    fixed = call(*words[:2], "--out", out, "--steps", 400, "--set", "checkpoint_minutes=0.01")
-    assert fixed.end() == DONE

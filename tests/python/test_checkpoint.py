@@ -20,10 +20,9 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.tensor_files import LONGEST_PICKLE
 from splitnerf.errors import InputError
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import make_grid
 from splitnerf.training import checkpoint
 from splitnerf.training import loop as trainer
-from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser, restored_grid
+from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser
 from splitnerf.training.schedule import make_optimiser
 from test_files import no_more_than
 from tiny_runs import tiny
@@ -369,18 +368,6 @@ def test_a_checkpoint_that_does_not_fit_is_refused(data, content, tmp_path, case
     torch.set_rng_state(before)
 
 
-def test_moments_come_back_and_rates_are_those_of_the_settings(content):
-    settings = tiny(learning_rate=0.07)
-    optimiser = make_optimiser(SceneModel(settings), settings)
-    fresh = [{key: x for key, x in group.items() if key != "params"} for group in optimiser.param_groups]
-    restore_optimiser(optimiser, content, Path("checkpoint.pt"))
-    assert [{key: x for key, x in group.items() if key != "params"} for group in optimiser.param_groups] == fresh
-    parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
-    for index, moments in content["optimiser"]["state"].items():
-        assert all(torch.equal(optimiser.state[parameters[index]][name], moments[name]) for name in moments)
-    assert len(optimiser.state) == len(content["optimiser"]["state"]) > 0
-
-
 @pytest.mark.parametrize("index", [-1, "count", "0"])
 def test_moments_of_no_parameter_are_refused(content, index):
     settings = tiny()
@@ -390,11 +377,6 @@ def test_moments_of_no_parameter_are_refused(content, index):
     state[count if index == "count" else index] = state[count - 1]  # which would fit the last parameter
     with pytest.raises(InputError, match="its optimiser does not fit the settings"):
         restore_optimiser(optimiser, content, Path("checkpoint.pt"))
-
-
-def test_cells_come_back_by_their_values_and_by_their_classes(content):
-    values, cells = restored_grid(make_grid(tiny()), content, Path("checkpoint.pt"))
-    assert torch.equal(values, content["occupancy"]) and torch.equal(cells, content["cells"])
 
 
 def test_generators_go_on_where_they_stopped_or_begin_with_seed_and_step(content):

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 from blender_data import edit, set_pose
 from layout_scenes import COUNT, write_colmap, write_transforms
-from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.config import Config
 from splitnerf.data.reading import Reading
-from tiny_runs import train
+from tiny_runs import command, train
 
 STEPS = ("--steps", "2")
 EAST = np.eye(4, k=3)  # a pose's step along x
@@ -41,49 +41,22 @@ def test_what_is_held_out_is_said(tmp_path, capsys):
     said = f"{data}: 14 views to train on, 2 are held out for testing (every 8th; --eval-mode all trains on all)"
     assert capsys.readouterr().err.count(said) == 1
     assert n_views(tmp_path / "run/evaluation.json") == 2
-    assert (
-        main(
-            [
-                "evaluate",
-                str(tmp_path / "run"),
-                "--data",
-                str(data),
-                "--eval-mode",
-                "all",
-                "--out",
-                str(tmp_path / "s.json"),
-            ]
-        )
-        == DONE
-    )
-    assert (
-        "16 views to train on, no view is held out for testing (all are trained on and evaluated)"
-        in capsys.readouterr().err
-    )
+    words = "--data", data, "--eval-mode", "all", "--out", tmp_path / "s.json"
+    assert command("evaluate", tmp_path / "run", *words) == DONE
+    said = "16 views to train on, no view is held out for testing (all are trained on and evaluated)"
+    assert said in capsys.readouterr().err
     assert n_views(tmp_path / "s.json") == COUNT
 
 
 def test_later_commands_read_the_data_as_the_run_did(run_on_all, tmp_path, capsys):
     run, data = run_on_all / "run", run_on_all / "data"
-    assert main(["evaluate", str(run), "--data", str(data), "--out", str(tmp_path / "run.json")]) == DONE
-    asset = ["evaluate", str(run / "mesh.glb"), "--data", str(data), "--spp", "1"]
-    assert main([*asset, "--out", str(tmp_path / "asset.json")]) == DONE
-    assert main([*asset, "--out", str(tmp_path / "other.json"), "--eval-mode", "fraction"]) == DONE
+    assert command("evaluate", run, "--data", data, "--out", tmp_path / "run.json") == DONE
+    asset = "evaluate", run / "mesh.glb", "--data", data, "--spp", 1
+    assert command(*asset, "--out", tmp_path / "asset.json") == DONE
+    assert command(*asset, "--out", tmp_path / "other.json", "--eval-mode", "fraction") == DONE
     assert [n_views(tmp_path / f"{name}.json") for name in ("run", "asset", "other")] == [COUNT, COUNT, 2]
-    relit = [
-        "relight",
-        str(run),
-        "--env",
-        str(run / "environment.hdr"),
-        "--data",
-        str(data),
-        "--spp",
-        "1",
-        "--size",
-        "8",
-    ]
-    assert main([*relit, "--out", str(tmp_path / "relit")]) == DONE
-    assert main([*relit, "--out", str(tmp_path / "fewer"), "--eval-mode", "fraction"]) == DONE
+    relit = "relight", run, "--env", run / "environment.hdr", "--data", data, "--spp", 1, "--size", 8, "--out"
+    assert command(*relit, tmp_path / "relit") == command(*relit, tmp_path / "fewer", "--eval-mode", "fraction") == DONE
     assert [len(list((tmp_path / name).glob("*.png"))) for name in ("relit", "fewer")] == [COUNT, 2]
 
 
@@ -107,7 +80,7 @@ def test_a_run_far_from_the_origin_says_where_it_is(tmp_path, capsys):
     assert stored["origin"] == [5e6, 0, 0] and stored["meaning"]
     vertices = np.asarray(trimesh.load_mesh(run / "mesh.ply").vertices)
     assert np.abs(vertices).max() < 2 and len(np.unique(vertices[:, 0])) > 20
-    assert main(["export", str(run), "--out", str(tmp_path / "asset"), "--formats", "ply"]) == DONE
+    assert command("export", run, "--out", tmp_path / "asset", "--formats", "ply") == DONE
     assert json.loads((tmp_path / "asset/origin.json").read_text()) == stored
     scores = json.loads((run / "evaluation.json").read_text())["novel_view"]
     assert scores["psnr"] > 8

@@ -34,14 +34,16 @@ with locked(Path(sys.argv[1])), atomic_path(Path(sys.argv[1]) / "sub" / "mesh.gl
 """
 
 
-@pytest.fixture
-def holder(tmp_path):
-    """A program that holds the folder `run` and has half-written a file there."""
-    process = subprocess.Popen([sys.executable, "-c", HOLDS, str(tmp_path / "run")], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "holds\n"
-    yield process
-    process.kill()
-    process.wait()
+@contextmanager
+def held(folder: Path) -> Iterator[subprocess.Popen]:
+    """A program that holds a folder and has half-written a file there; its end at the end of the block."""
+    process = subprocess.Popen([sys.executable, "-c", HOLDS, str(folder)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "holds\n"
+        yield process
+    finally:
+        process.kill()
+        process.wait()
 
 
 @contextmanager
@@ -126,14 +128,13 @@ def test_names_that_are_no_text(tmp_path):
 # ---- one folder ----
 
 
-def test_a_folder_in_use_is_refused_and_its_owner_named(tmp_path, holder):
+def test_a_folder_in_use_is_refused_and_its_owner_named(tmp_path):
     run = tmp_path / "run"
-    words = rf"run: is in use by pid {holder.pid} on {socket.gethostname()}; wait for its end, or give another --out"
-    with pytest.raises(InputError, match=words), locked(run):
-        pass
-    assert len(list((run / "sub").iterdir())) == 1  # what the owner is writing is left alone
-    holder.kill()
-    holder.wait()
+    with held(run) as owner:
+        words = rf"run: is in use by pid {owner.pid} on {socket.gethostname()}; wait for its end, or give another --out"
+        with pytest.raises(InputError, match=words), locked(run):
+            pass
+        assert len(list((run / "sub").iterdir())) == 1  # what the owner is writing is left alone
     with locked(run):
         assert f"pid {os.getpid()} on " in (run / LOCK).read_text() and list((run / "sub").iterdir()) == []
     assert not (run / LOCK).exists()

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 import torch
-from splitnerf.cli import BAD_INPUT, FAILED
+from splitnerf.cli import FAILED
 from splitnerf.data.dataset import load_dataset
-from splitnerf.training import gpu_step, state
 from splitnerf.training import loop as trainer
+from splitnerf.training import state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged, check_state, explain_loss
 from splitnerf.training.gpu_step import GpuStep
@@ -28,26 +26,6 @@ def goes_on(data: Path, run: Path, before: bytes) -> None:
     assert (run / "checkpoint.pt").read_bytes() == before
     trainer.train(load_dataset(data), tiny(steps=12), run, resume=True)
     assert load_checkpoint(run / "checkpoint.pt")["step"] == 12
-
-
-def write_floats(path: Path, pixels: np.ndarray) -> None:
-    """An EXR, whatever the path is called."""
-    sink = oiio.ImageOutput.create("any.exr")
-    assert sink.open(str(path), oiio.ImageSpec(*pixels.shape[1::-1], pixels.shape[2], oiio.FLOAT))
-    assert sink.write_image(pixels) and sink.close()
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -0.5])
-def test_an_image_with_a_bad_pixel_is_refused_and_named(data, tmp_path, capsys, value):
-    shutil.copytree(data, tmp_path / "data")
-    dataset = load_dataset(tmp_path / "data")
-    pixels = dataset.images[2].copy()
-    pixels[3, 4, 1] = value
-    write_floats(dataset.image_paths[2], pixels)
-    assert train(tmp_path / "data", tmp_path / "run", "--steps", "5") == BAD_INPUT
-    error = capsys.readouterr().err
-    assert dataset.image_paths[2].name in error and "pixels" in error and len(error.splitlines()) == 1
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.fixture(params=[Step, GpuStep])
@@ -125,26 +103,6 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
         int(moments["step"]) for moments in load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()
     }
     assert max(counts) == 5
-
-
-def test_numbers_that_are_read_late_are_those_of_their_step(data, tmp_path, monkeypatch):
-    """Only the number of rays follows later, and what a line tells of its time and of the mesh is of when it is written.
-    Where all samples are found no step has a capacity, and with the model's own sharpness the bits of all are equal."""
-    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 64)
-    monkeypatch.setattr(GpuStep, "s", property(lambda step: None, lambda step, s: None))
-    written, waiting, fetch = [], [], GpuStep.fetch
-    monkeypatch.setattr(GpuStep, "fetch", lambda step, *rest: waiting.append(len(step._pending)) or fetch(step, *rest))
-    for i, (kind, every) in enumerate([(Step, 1), (GpuStep, 1), (GpuStep, 16)]):
-        monkeypatch.setattr(state, "Step", kind)
-        monkeypatch.setattr(gpu_step, "READ_EVERY", every)
-        (tmp_path / str(i)).mkdir()
-        trainer.train(load_dataset(data), tiny(steps=41, **{"sampling.min_weight": 0.0}), tmp_path / str(i))
-        written.append(
-            [line | dict.fromkeys(("seconds", "progress", "is_unoccluded")) for line in lines_of(tmp_path / str(i))]
-        )
-    assert [line["step"] for line in written[0]] == [*range(1, 21), 40, 41]
-    assert written[1] == written[0] and written[2] == written[0]
-    assert max(waiting[:41]) == 1 and max(waiting[41:]) == 16
 
 
 def step_of(*gradients: list[float] | None) -> Step:

@@ -20,8 +20,7 @@ from splitnerf_tools.batch.cluster import Share, share_of
 from splitnerf_tools.batch.scenes import Scene, keep_scenes, known_scenes, markdown, requested_scenes, scene_name
 from splitnerf_tools.batch.tasks import BatchPlan, run_batch
 from splitnerf_tools.commands.batch import given_options
-from test_files import HOLDS
-from tiny_runs import as_options
+from test_files import held
 
 GB = 1e9
 
@@ -34,18 +33,13 @@ GB = 1e9
     [
         ("/a/chair", "chair"),
         ("/a/..", "scene"),
-        ("/", "scene"),
         ("/a/-rf", "rf"),
         ("/a/.hidden", "hidden"),
-        ("/a/two words", "two_words"),
         ("/a/\x1b]0;owned\x07\n", "_0_owned_"),
         ("/a/K\u00e4fer", "K_fer"),
         ("/a/\udcff", "_"),
-        ("/a/$(reboot)", "_reboot_"),
         ("/a/logs", "logs-2"),
         ("/a/Batch.JSON", "Batch.JSON-2"),
-        ("/a/lock", "lock-2"),
-        ("/a/Ray", "Ray-2"),
         ("/a/" + 300 * "x", 80 * "x"),
     ],
 )
@@ -100,14 +94,8 @@ def test_every_option_of_train_is_one_of_batch_but_where_to_write():
         name: {o for a in build_parser()._subparsers._group_actions[0].choices[name]._actions for o in a.option_strings}
         for name in ("train", "batch")
     }
-    assert options["train"] - options["batch"] == {
-        "--output-dir",
-        "--resume",
-        "--overwrite",
-        "--downscale-factor",
-        "--view",
-        "--tensorboard",
-    }
+    alone = "--output-dir --resume --overwrite --downscale-factor --view --tensorboard"
+    assert options["train"] - options["batch"] == set(alone.split())
 
 
 @pytest.mark.parametrize(
@@ -135,14 +123,9 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
 
 
 def test_a_folder_in_use_is_refused(tmp_path, capsys):
-    owner = subprocess.Popen([sys.executable, "-c", HOLDS, str(tmp_path / "out")], stdout=subprocess.PIPE)
-    owner.stdout.readline()
-    try:
+    with held(tmp_path / "out") as owner:
         assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == BAD_INPUT
         assert f"in use by pid {owner.pid} on " in capsys.readouterr().err
-    finally:
-        owner.kill()
-        owner.wait()
 
 
 # ---- shares ----
@@ -235,10 +218,8 @@ def test_the_last_word_says_why(tmp_path, said, code, error):
 
 
 def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
-    owner = subprocess.Popen([sys.executable, "-c", HOLDS, str(tmp_path / "run")], stdout=subprocess.PIPE)
-    owner.stdout.readline()
     monkeypatch.setattr(child, "TIMEOUT", 0.3)
-    try:
+    with held(tmp_path / "run"):
         assert is_locked(tmp_path / "run")
         outcome = train_scene(work_in(tmp_path, tmp_path))
         assert outcome == Outcome(None, f"{tmp_path / 'run'}: is in use by another program", False)
@@ -248,9 +229,6 @@ def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
         (tmp_path / "left/.half.partial.glb").touch()
         remove_partial(tmp_path)
         assert (tmp_path / "run/.half.partial.glb").exists() and not list((tmp_path / "left").iterdir()) and halves
-    finally:
-        owner.kill()
-        owner.wait()
     assert (tmp_path / "run" / LOCK).exists() and not is_locked(tmp_path / "run") and not is_locked(tmp_path)
 
 
@@ -370,11 +348,8 @@ def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
     return batch, ray, rows, notes, run_batch(ray, batch, Share(1, 0, 4))
 
 
-KILLED, REFUSED, BROKE = (
-    Outcome(-9, "was killed by SIGKILL", False),
-    Outcome(2, "bad", False),
-    Outcome(1, "loss is nan", False),
-)
+KILLED, REFUSED = Outcome(-9, "was killed by SIGKILL", False), Outcome(2, "bad", False)
+BROKE = Outcome(1, "loss is nan", False)
 LOST = ERRORS.WorkerCrashedError()
 
 
@@ -423,9 +398,3 @@ def test_an_interrupt_cancels_all_and_waits_for_them(tmp_path):
     assert not ended and rows == [("a", "done"), ("b", "stopped"), ("c", "waiting")] and len(ray.cancelled) == 2
     ends = {"/a": [Outcome(0, "", False)], "/b": [REFUSED], "/c": [Outcome(0, "", False)]}
     assert batch_of(tmp_path, ends)[2] == [("a", "done"), ("b", "refused"), ("c", "done")]  # a second call
-
-
-def test_a_batch_is_not_written_into_data(data, capsys):
-    before = sorted(data.rglob("*"))
-    assert main(["batch", "a", "--out", str(data), *as_options({"n_levels": 4})]) == BAD_INPUT
-    assert "holds a data set" in capsys.readouterr().err and before == sorted(data.rglob("*"))

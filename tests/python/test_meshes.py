@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import threading
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 import torch
 import trimesh
-from pretend_gpu import GPU, pretend_gpu
 from splitnerf.config import preset
-from splitnerf.fields.occlusion import TracedBits
-from splitnerf.ops import SdfNetwork
 from splitnerf.render.model import SceneModel
 from splitnerf.training import meshes
 from splitnerf.training.meshes import SurfaceMesh
@@ -38,32 +34,6 @@ def test_a_mesh_is_the_surface_in_the_whole_box_at_its_resolution():
     cell = 2 * 1.6 / 23
     assert np.sqrt(2) * cell < shape.edges_unique_length.max() < np.sqrt(3) * cell
     assert mesh.scene is mesh.current.scene and len(model.occlusion.cache.vertices) == len(shape.vertices)
-
-
-def content_of(mesh: SurfaceMesh) -> dict:
-    """What a checkpoint holds of a mesh."""
-    return mesh.state() | {"occlusion_light": mesh.model.occlusion.cached_light()}
-
-
-def test_a_mesh_comes_back_as_it_was_stored(model):
-    """Traced where the light of then was, not that of the other model."""
-    with torch.no_grad():
-        model.light.texels.normal_()
-    stored = SurfaceMesh(model)
-    nothing = content_of(stored)
-    stored.request(0.3)
-    torch.manual_seed(1)
-    other = SceneModel(model.config)
-    restored = SurfaceMesh(other)
-    restored.restore(nothing)
-    assert restored.current is None and not other.occlusion.ready
-    restored.restore(content_of(stored))
-    assert (restored.asked_at, restored.made_at) == (0.3, 0.3) and restored.scene is not None
-    assert torch.equal(restored.current.vertices, stored.current.vertices)
-    assert torch.equal(restored.current.faces, stored.current.faces)
-    assert other.occlusion.ready and torch.equal(other.occlusion.cache.bits, model.occlusion.cache.bits)
-    assert torch.equal(other.occlusion.directions, model.occlusion.directions)
-    assert not torch.equal(other.occlusion.directions, other.occlusion.centres)
 
 
 @pytest.mark.parametrize("background", [False, True])
@@ -125,47 +95,3 @@ def test_what_goes_wrong_beside_is_told(model):
     with pytest.raises(RuntimeError, match="not finite"):
         mesh.poll(wait=True)
     assert mesh.current is None
-
-
-def test_beside_it_works_in_a_stream_of_its_own_and_brings_the_bits_to_the_device(model, monkeypatch):
-    """The copy of the field is made before the stream goes on; the caller's stream waits before the bits are used."""
-    with pretend_gpu(monkeypatch):
-        told, main = [], threading.current_thread()
-
-        class Noted:
-            def __init__(self, name):
-                self.name = name
-
-            def wait_stream(self, other):
-                told.append(f"{self.name} waits for {other.name}")
-
-        @contextmanager
-        def within(stream):
-            assert threading.current_thread() is not main
-            told.append(f"in {stream.name}")
-            yield
-            told.append(f"out of {stream.name}")
-
-        monkeypatch.setattr(torch.cuda, "Stream", lambda device: Noted("ours"))
-        monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Noted("theirs"))
-        monkeypatch.setattr(torch.cuda, "stream", within)
-        monkeypatch.setattr(torch.cuda, "synchronize", None)  # the host waits for nothing
-        snapshot, moved, use = SdfNetwork.snapshot, TracedBits.to, type(model.occlusion).use
-        monkeypatch.setattr(SdfNetwork, "snapshot", lambda self: told.append("copied") or snapshot(self))
-        monkeypatch.setattr(TracedBits, "to", lambda self, device: told.append("moved") or moved(self, device))
-        monkeypatch.setattr(type(model.occlusion), "use", lambda self, bits: told.append("used") or use(self, bits))
-        mesh = SurfaceMesh(model.to("cuda"), background=True)
-        mesh.request(0.1)
-        mesh.poll(wait=True)
-        assert mesh.current is not None and model.occlusion.cache.bits.device == GPU
-    made = [
-        "copied",
-        "ours waits for theirs",
-        "in ours",
-        "moved",
-        "out of ours",
-        "theirs waits for ours",
-        "used",
-        "moved",
-    ]
-    assert told == made

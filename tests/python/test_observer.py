@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from types import SimpleNamespace
 
@@ -12,7 +11,7 @@ from splitnerf.cli import DONE, main
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.pipeline import load_run, reconstruct
+from splitnerf.pipeline import reconstruct
 from splitnerf.progress import Interrupt
 from splitnerf.refinement.refine import STATE
 from splitnerf.training import loop
@@ -102,7 +101,7 @@ def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
             return None
         if ends is Request.STOP:
             return ends
-        os.kill(os.getpid(), ends)
+        signal.raise_signal(ends)
         return None
 
     config = tiny(steps=40)
@@ -113,13 +112,6 @@ def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
     training.stopped = False
     training.complete()
     assert [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24, 40]
-
-
-def test_a_checkpoint_shows_the_levels_that_were_open(data, tmp_path):
-    """Levels that were never trained hold noise."""
-    config = tiny(steps=400, start_levels=2, levels_open_by=1.0)
-    scene, _ = reconstruct(data, tmp_path / "run", config, observer=Asking(20, Request.STOP))
-    assert load_run(tmp_path / "run")[0].sdf_field.grid.n_active == scene.model.sdf_field.grid.n_active == 2
 
 
 @pytest.mark.parametrize("stage_begun", [True, False])
@@ -146,14 +138,6 @@ def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
     assert set(steps) == {8}
 
 
-def test_a_pause_is_no_time_of_training(data, tmp_path):
-    asking = Asking(8, *[Request.PAUSE] * 3)
-    training = Training(load_dataset(data), tiny(steps=16), tmp_path, CPU, asking)
-    started = training.started
-    assert training.complete().step == 16 and not asking.requests
-    assert training.started - started >= 0.99 * 3 * loop.PAUSE
-
-
 def test_the_time_of_a_pause_is_told(monkeypatch):
     clock = [0.0]
     fake = SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: clock.__setitem__(0, clock[0] + seconds))
@@ -176,7 +160,7 @@ def test_a_signal_ends_a_paused_run(data, tmp_path, number):
     def pausing(event):
         if event.kind != "step" or event.training.step < 8:
             return None
-        os.kill(os.getpid(), number)
+        signal.raise_signal(number)
         return Request.PAUSE
 
     scene = trained(data, tmp_path, tiny(steps=400), pausing)

@@ -130,13 +130,6 @@ def test_an_export_does_not_replace_what_the_refinement_fitted(run, tmp_path, ca
     assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
 
 
-def test_refine_starts_from_what_was_trained(run, data, tmp_path):
-    """The same command again on a refined run does what the refinement did."""
-    run = shutil.copytree(run, tmp_path / "run")
-    assert main(["refine", str(run), "--data", str(data), "--sweeps", "2"]) == DONE
-    assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
-
-
 # ---- its end, and going on ----
 
 
@@ -304,7 +297,8 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
     refused("another asset")
 
 
-def test_refine_can_be_interrupted_and_goes_on(run, data, tmp_path, monkeypatch, capsys):
+def test_refine_starts_from_what_was_trained_and_can_be_interrupted(run, data, tmp_path, monkeypatch, capsys):
+    """The same command again on a refined run does what the refinement did."""
     run = shutil.copytree(run, tmp_path / "run")
     command = ["refine", str(run), "--data", str(data), "--sweeps", "2"]
     with monkeypatch.context() as patch:
@@ -312,21 +306,8 @@ def test_refine_can_be_interrupted_and_goes_on(run, data, tmp_path, monkeypatch,
         assert main(command) == INTERRUPTED
     assert "--resume" in capsys.readouterr().out
     assert main([*command, "--resume"]) == DONE
-    assert (
-        bytes_of(run / "refined", "mesh.glb") == bytes_of(run, "mesh.glb")
-        and not (run / "refined" / "refinement.pt").exists()
-    )
-
-
-def test_time_ends_a_stage_by_its_minutes(painted):
-    stage = Stage(painted[1], painted[0], sky(), dataclasses.replace(QUICK, minutes=1e-6, outline=False))
-    assert not stage.finished and stage.progress < 1.0  # a first sweep is always made
-    stage.advance()
-    assert stage.finished and stage.progress == 1.0
-    stage.settings = dataclasses.replace(QUICK, minutes=1e6)
-    assert not stage.finished and stage.progress == 0.25
-    stage.settings, stage.started = dataclasses.replace(QUICK, minutes=2.0), stage.started - 60.0
-    assert 0.5 < stage.progress < 0.6
+    assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
+    assert not (run / "refined" / "refinement.pt").exists()
 
 
 class Clock:
@@ -349,6 +330,18 @@ class Clock:
 
         monkeypatch.setattr(Refinement, "gather", slow_batch)
         monkeypatch.setattr(stage_module, "fit_outline", slow_outline)
+
+
+def test_time_ends_a_stage_by_its_minutes(painted, monkeypatch):
+    clock, settings = Clock(monkeypatch, of_batch=1.0), dataclasses.replace(QUICK, minutes=1e-6, outline=False)
+    stage = Stage(painted[1], painted[0], sky(), settings)
+    assert not stage.finished and stage.progress < 1.0  # a first sweep is always made
+    stage.advance()
+    assert stage.finished and stage.progress == 1.0
+    stage.settings = dataclasses.replace(QUICK, minutes=1e6)
+    assert not stage.finished and stage.progress == 0.25
+    stage.settings, stage.started = dataclasses.replace(QUICK, minutes=2.0), clock.now - 66.0
+    assert stage.progress == pytest.approx(0.55)
 
 
 def test_a_slow_machine_keeps_to_the_minutes_by_smaller_sweeps(painted, monkeypatch):

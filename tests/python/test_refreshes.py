@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 import threading
 import time
 from types import SimpleNamespace
@@ -76,11 +75,6 @@ def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_fir
         (step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)
     ] + [(19, {})]
     assert 0 < trained.grid.hull.float().mean() < 0.6
-
-
-def test_light_gathers_and_moves_with_its_period(refreshed):
-    _, seen = refreshed(light_step_every=4)
-    assert seen["backward"] == [*range(3, 20, 4)]
 
 
 def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypatch):
@@ -287,18 +281,6 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     assert kept["occlusion_light"]["sky"].std() > 0.2 and kept["meshed_at"] == 0.375 and kept["n_rays"] == 77
 
 
-def test_a_run_that_is_interrupted_ends_when_the_light_has_moved(data, tmp_path, monkeypatch):
-    """In step 5 of 20: it goes on to step 8 and leaves cells and mesh to the run that continues it."""
-    at = steps_of(monkeypatch)
-    cells = calls(monkeypatch, OccupancyGrid, "update", lambda *_, **__: at[0])
-    requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
-    calls(monkeypatch, loop.Training, "advance", lambda self, *_: self.step == 5 and signal.raise_signal(signal.SIGINT))
-    config = tiny(steps=20, light_step_every=4, grid_every=3, mesh_every=0.3, preview_every=2.0)
-    trained = loop.train(load_dataset(data), config, tmp_path)
-    assert trained.step == 8 and not trained.finished and cells == [0, 3, 6] and requests == [0.3]
-    assert load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 8
-
-
 @pytest.mark.parametrize("deterministic", [False, True])
 def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch, deterministic):
     """A run whose bits repeat waits for each, another goes on without it."""
@@ -386,12 +368,3 @@ def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
     assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
     assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())
     assert not loop.Training(load_dataset(data), tiny(hull_until=0.0), tmp_path, torch.device("cpu")).grid.hull
-
-
-def test_without_indirect_light_nothing_is_refreshed_between_two_meshes(data, tmp_path, monkeypatch):
-    """Each of the two is told to the occlusion, which leaves the light out."""
-    at = steps_of(monkeypatch)
-    indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
-    config = tiny(steps=6, mesh_every=0.5, indirect=False, indirect_every=1, preview_every=2.0)
-    loop.train(load_dataset(data), config, tmp_path)
-    assert indirect == [3] * 3 + [5] * 3

@@ -14,7 +14,7 @@ from splitnerf import ops
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
-from tiny_runs import train
+from tiny_runs import command, contents
 from torch.autograd import forward_ad
 
 
@@ -32,7 +32,7 @@ def asset(tmp_path):
 def refused(capsys, *words: object) -> str:
     """The one line, notes aside, of a command that is refused."""
     capsys.readouterr()
-    assert main([str(word) for word in words]) == BAD_INPUT
+    assert command(*words) == BAD_INPUT
     (error,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
     assert error.startswith("splitnerf: ")
     return error
@@ -52,30 +52,30 @@ def test_relight_replaces_only_its_own_pictures(tmp_path, asset, grey, capsys):
         write_image(photos / f"{i:03d}.exr", np.full((4, 4, 3), 0.5))
         content = (photos / f"{i:03d}.exr").read_bytes()
         (photos / f"{i:03d}.exr").write_bytes(content.replace(b"SplitNeRF", b"Blender.."))
-    before = {path: path.read_bytes() for path in photos.iterdir()}
+    before = contents(photos)
     for words in ((), ("--overwrite",), ("--overwrite", "--turntable", "2")):
         error = refused(capsys, *relit(asset, "--env", grey, "--out", photos, *words))
         assert "000.exr: was not written by relight" in error
-    assert before == {path: path.read_bytes() for path in photos.iterdir()}
+    assert before == contents(photos)
     for name in ("000.png", "000.exr"):
         (photos / name).unlink()
-    assert main(list(map(str, relit(asset, "--env", grey, "--out", photos)))) == DONE
-    assert main(list(map(str, relit(asset, "--env", grey, "--out", photos, "--overwrite")))) == DONE
+    assert command(*relit(asset, "--env", grey, "--out", photos)) == DONE
+    assert command(*relit(asset, "--env", grey, "--out", photos, "--overwrite")) == DONE
     assert all((photos / path.name).read_bytes() == content for path, content in before.items() if path.stem != "000")
 
 
 def test_an_overwriting_relight_without_room_keeps_the_pictures(tmp_path, asset, grey, monkeypatch, capsys):
-    words = list(map(str, relit(asset, "--env", grey, "--out", tmp_path / "out", "--turntable", "2")))
-    assert main(words) == DONE
-    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    words = relit(asset, "--env", grey, "--out", tmp_path / "out", "--turntable", 2)
+    assert command(*words) == DONE
+    before = contents(tmp_path / "out")
 
     def fails(_) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", fails)
-    assert main([*words, "--overwrite", "--seed", "5"]) == FAILED
+    assert command(*words, "--overwrite", "--seed", 5) == FAILED
     assert "000.exr: cannot be written (No space left on device)" in capsys.readouterr().err
-    assert before == {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert before == contents(tmp_path / "out")
 
 
 def test_a_map_without_a_name_has_no_folder_of_its_own(tmp_path, asset, grey, capsys):
@@ -128,8 +128,8 @@ def test_an_asset_without_scenes_makes_data(tmp_path, grey):
     gltf.json.pop("scenes", None)
     gltf.json.pop("scene", None)
     source = gltf.write(tmp_path / "asset.glb")
-    words = ["--size", "8", "--train", "1", "--test", "1", "--spp", "1", "--out", tmp_path / "data"]
-    assert main([str(word) for word in ("synth", source, "--light", grey, *words)]) == DONE
+    words = "--size", 8, "--train", 1, "--test", 1, "--spp", 1, "--out", tmp_path / "data"
+    assert command("synth", source, "--light", grey, *words) == DONE
     placed, original = read_asset(tmp_path / "data/asset.glb"), read_asset(source)
     assert len(placed.triangles) == len(original.triangles) and np.abs(placed.vertices).max() <= 1.0001
 
@@ -137,19 +137,17 @@ def test_an_asset_without_scenes_makes_data(tmp_path, grey):
 # ---- scores ----
 
 
-def test_scores_of_another_run_are_not_replaced(data, other_data, tmp_path, capsys):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+def test_scores_of_another_run_are_not_replaced(data, other_data, done, tmp_path, capsys):
+    run, before = done, contents(done)
     assert "was trained on other images" in refused(capsys, "evaluate", run, "--data", other_data)
     for option, victim in (("--table", "checkpoint.pt"), ("--out", "checkpoint.pt"), ("--out", "config.toml")):
         words = ["evaluate", run, "--data", data, option, run / victim]
         assert f"{victim}: is not an earlier result, and would be replaced" in refused(capsys, *words)
-    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert contents(run) == before
     (tmp_path / "empty.json").touch()
     for _ in range(2):
         words = ["evaluate", run, "--data", data, "--table", tmp_path / "t.md", "--out", tmp_path / "empty.json"]
-        assert main([str(word) for word in words]) == DONE
+        assert command(*words) == DONE
 
 
 @pytest.mark.parametrize(

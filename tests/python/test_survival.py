@@ -24,29 +24,12 @@ from splitnerf.progress import Interrupt, ended_by_signals
 from splitnerf.training import loop, state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
-from test_files import HOLDS
+from test_files import held
 from test_train import flat, same
-from tiny_runs import SMALL, as_options, lines_of, tiny, train
+from tiny_runs import SMALL, as_options, command, contents, lines_of, tiny, train
 from tqdm import tqdm
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-
-
-@pytest.fixture
-def at_step(monkeypatch):
-    """A function that calls another when the given step begins."""
-
-    def set_up(step: int, action) -> None:
-        original = loop.Training.refresh
-
-        def refresh(training) -> None:
-            if training.step == step:
-                action()
-            original(training)
-
-        monkeypatch.setattr(loop.Training, "refresh", refresh)
-
-    return set_up
 
 
 # ---- signals ----
@@ -213,15 +196,10 @@ def test_names_do_not_command_the_terminal(tmp_path, capsys):
 # ---- the folder ----
 
 
-def test_a_run_in_use_is_refused(data, tmp_path, capsys):
+def test_a_run_in_use_is_refused(data, done, capsys):
     """Whatever would write there."""
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    owner = subprocess.Popen([sys.executable, "-c", HOLDS, str(run)], stdout=subprocess.PIPE)
-    owner.stdout.readline()
-    capsys.readouterr()
-    try:
+    run, before = done, contents(done)
+    with held(run) as owner:
         for words in (
             ["train", data, "--out", run, "--resume"],
             ["train", data, "--out", run, "--overwrite"],
@@ -231,22 +209,17 @@ def test_a_run_in_use_is_refused(data, tmp_path, capsys):
             ["evaluate", run, "--data", data],
             ["refine", run, "--data", data, "--out", run],
         ):
-            assert main([str(word) for word in words]) == BAD_INPUT
+            assert command(*words) == BAD_INPUT
             error = capsys.readouterr().err
             assert f"in use by pid {owner.pid} on " in error and len(error.splitlines()) == 1
-    finally:
-        owner.kill()
-        owner.wait()
     (run / LOCK).unlink()
     shutil.rmtree(run / "sub")  # what the owner was writing
-    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert contents(run) == before
 
 
-def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, tmp_path, capsys):
+def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, done, capsys):
     """Refused when it goes on, or refused for its settings when it is to be replaced; the demo replaces none."""
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    before = contents(done)
     for words in (
         ["train", other_data, "--resume", "--steps", "9"],
         ["train", data, "--resume", "--set", "n_levels=5"],
@@ -259,41 +232,35 @@ def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, tmp_path, c
         ["demo", "--seed", "99999999999999999999", "--overwrite"],
         ["demo"],
     ):
-        assert main([*map(str, words), "--out", str(run)]) == BAD_INPUT, words
-        assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}, words
+        assert command(*words, "--out", done) == BAD_INPUT, words
+        assert contents(done) == before, words
     assert "holds a run already" in capsys.readouterr().err
 
 
-def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, tmp_path, monkeypatch):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "4") == DONE
-    before = (run / "checkpoint.pt").read_bytes()
+def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, done, monkeypatch):
+    before = contents(done)
 
     def fails(*_) -> None:
         raise MemoryError("32 TiB")
 
     monkeypatch.setattr(state, "SceneModel", fails)
-    assert train(data, run, "--overwrite") == FAILED
-    assert (run / "checkpoint.pt").read_bytes() == before and (run / "mesh.glb").is_file()
+    assert train(data, done, "--overwrite") == FAILED
+    assert contents(done) == before
 
 
-@pytest.mark.parametrize("command", ["train", "demo", "export", "refine", "relight"])
-def test_data_are_not_replaced_by_results(data, begun, tmp_path, capsys, command):
-    run, folder = begun[0], Path(os.path.realpath(data))
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-    words = {
-        "train": ["train", data, "--overwrite"],
-        "demo": ["demo", "--overwrite"],
-        "export": ["export", run],
-        "refine": ["refine", run, "--data", data],
-        "relight": ["relight", run / "mesh.glb", "--env", data / "light.hdr", "--overwrite"],
-    }[command]
-    if command == "relight":
-        main(["export", str(run), "--formats", "glb", "--resolution", "32", "--texture-size", "16"])
-    capsys.readouterr()
-    assert main([*map(str, words), "--out", str(data)]) == BAD_INPUT
-    assert "holds a data set, which results would replace" in capsys.readouterr().err
-    assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+def test_data_are_not_replaced_by_results(data, trained_once, capsys):
+    run, before = trained_once, contents(data)
+    for words in (
+        ["train", data, "--overwrite"],
+        ["demo", "--overwrite"],
+        ["export", run],
+        ["refine", run, "--data", data],
+        ["relight", run / "mesh.glb", "--env", data / "light.hdr", "--overwrite"],
+        ["batch", "a"],
+    ):
+        assert command(*words, "--out", data) == BAD_INPUT, words
+        assert "holds a data set, which results would replace" in capsys.readouterr().err, words
+        assert contents(data) == before, words
 
 
 def test_a_folder_that_was_removed_ends_a_run_with_one_line(data, tmp_path, at_step, capsys):

@@ -1,9 +1,8 @@
-"""Training as a user runs it: files, exit codes, resume, interruption, a full disk."""
+"""Training as a user runs it: files, exit codes, resume, interruption."""
 
 from __future__ import annotations
 
 import json
-import os
 import signal
 
 import numpy as np
@@ -11,43 +10,36 @@ import pytest
 import torch
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
+from splitnerf.data.dataset import load_dataset
+from splitnerf.devices import same_bits
+from splitnerf.ops.hash_grid import rounded
 from splitnerf.training.checkpoint import load_checkpoint
-from tiny_runs import SMALL, as_options, tiny, train
+from splitnerf.training.loop import train as train_scene
+from tiny_runs import SMALL, as_options, contents, lines_of, tiny, train
 
 
-def test_a_run_holds_every_file(data, tmp_path, capsys):
-    run = tmp_path / "run"
+def test_a_run_holds_every_file_and_evaluate_repeats_its_scores(data_with_mesh, tmp_path, capsys):
+    data, run = data_with_mesh, tmp_path / "run"
     assert train(data, run, "--steps", "25") == DONE
-    for name in (
-        "config.toml",
-        "checkpoint.pt",
-        "metrics.jsonl",
-        "mesh.ply",
-        "mesh.glb",
-        "environment.exr",
-        "environment.hdr",
-        "evaluation.json",
-        "report.html",
-    ):
-        assert (run / name).stat().st_size > 0, name
-    assert list((run / "previews").glob("step_*.png"))
-    evaluation = json.loads((run / "evaluation.json").read_text())
-    assert {
-        "novel_view",
-        "albedo",
-        "relight",
-        "normal_mae_deg",
-        "roughness_mae",
-        "metallic_balanced_accuracy",
-        "light_psnr",
-        "chamfer",
-        "f_score",
-        "seconds",
-    } <= set(evaluation)
-    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    assert lines[-1]["step"] == 25 and all(np.isfinite(line["loss"]) for line in lines)
     said = capsys.readouterr().out
     assert "PSNR" in said and " s on the CPU\n" in said
+    assets = ["mesh.ply", "mesh.glb", "environment.exr", "environment.hdr"]
+    for name in (*assets, "config.toml", "checkpoint.pt", "report.html"):
+        assert (run / name).stat().st_size > 0, name
+    assert list((run / "previews").glob("step_*.png"))
+    lines = lines_of(run)
+    assert lines[-1]["step"] == 25 and all(np.isfinite(line["loss"]) for line in lines)
+
+    first, before = json.loads((run / "evaluation.json").read_text()), [(run / x).stat().st_mtime_ns for x in assets]
+    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
+    again = json.loads((run / "evaluation.json").read_text())
+    assert again["novel_view"]["psnr"] == pytest.approx(first["novel_view"]["psnr"], abs=0.05)
+    assert first["chamfer"] > 0 and again["f_score"] == pytest.approx(first["f_score"], abs=1e-3)
+    assert first.keys() == again.keys() and again["relight"] is None
+    assert before == [(run / x).stat().st_mtime_ns for x in assets]
+    kept, other = (run / "evaluation.json").read_bytes(), tmp_path / "other.json"
+    assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--out", str(other)]) == DONE
+    assert json.loads(other.read_text())["views"] == 1 and (run / "evaluation.json").read_bytes() == kept
 
 
 @pytest.mark.parametrize(
@@ -56,13 +48,9 @@ def test_a_run_holds_every_file(data, tmp_path, capsys):
 )
 def test_the_error_falls_whatever_steps_and_tables(data, tmp_path, settings):
     """And the copy that is read is that of the table as it was trained."""
-    from splitnerf.data.dataset import load_dataset
-    from splitnerf.ops.hash_grid import rounded
-    from splitnerf.training.loop import train as train_scene
-
     config = preset("cpu").replace(SMALL | {"steps": 120} | settings)
     grid = train_scene(load_dataset(data), config, tmp_path).model.sdf_field.grid
-    psnr = [json.loads(line)["psnr"] for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
+    psnr = [line["psnr"] for line in lines_of(tmp_path)]
     assert psnr[-1] > psnr[0] + 2.0
     assert (grid.stored() is None) == ("table_dtype" not in settings)
     if grid.copy is not None:
@@ -70,8 +58,6 @@ def test_the_error_falls_whatever_steps_and_tables(data, tmp_path, settings):
 
 
 def test_torch_adds_in_a_fixed_order_where_asked():
-    from splitnerf.devices import same_bits
-
     for on in (False, True):
         with same_bits(on):
             assert torch.are_deterministic_algorithms_enabled() == on
@@ -110,18 +96,15 @@ RESUMED |= {
 
 
 @pytest.mark.parametrize("settings", RESUMED.values(), ids=RESUMED)
-def test_an_interrupted_run_ends_with_the_bits_of_an_uninterrupted_one(data, tmp_path, settings):
+def test_an_interrupted_run_ends_with_the_bits_of_an_uninterrupted_one(data, tmp_path, at_step, settings):
     """All that a checkpoint holds, but for the seconds: 28 steps, of which 12 or 20 (a dented surface) before Ctrl-C."""
-    from splitnerf.data.dataset import load_dataset
-    from splitnerf.training.loop import train as train_scene
-
     dataset, config = load_dataset(data), tiny(steps=28, deterministic=True, **settings)
     for name in ("whole", "halves"):
         (tmp_path / name).mkdir()
     train_scene(dataset, config, tmp_path / "whole")
     stop = 20 if "learning_rate" in settings else 12
-    with pytest.raises(KeyboardInterrupt):
-        _stop_after(stop - 1, lambda: train_scene(dataset, config, tmp_path / "halves"))
+    at_step(stop - 2, lambda: signal.raise_signal(signal.SIGINT))  # to this thread, so that it comes at once
+    assert not train_scene(dataset, config, tmp_path / "halves").finished
     # The light moves every 4 steps: the run goes on until it has.
     stopped = load_checkpoint(tmp_path / "halves" / "checkpoint.pt")["step"]
     assert stopped == (stop if settings.get("light.kind") != "mlp" else stop - 1)
@@ -144,37 +127,12 @@ def same(a: object, b: object) -> bool:
     return torch.equal(a, b) if isinstance(a, torch.Tensor) else a == b
 
 
-def _stop_after(steps: int, run) -> None:
-    """Sends SIGINT to this process when the given step begins; raises KeyboardInterrupt once training returned."""
-    from splitnerf.training import loop as module
-
-    original, count = module.set_learning_rate, 0
-
-    def counting(*args):
-        nonlocal count
-        count += 1
-        if count == steps:
-            os.kill(os.getpid(), signal.SIGINT)
-        return original(*args)
-
-    module.set_learning_rate = counting
-    try:
-        result = run()
-    finally:
-        module.set_learning_rate = original
-    assert not result.finished
-    raise KeyboardInterrupt
-
-
-def test_an_existing_run_is_not_written_over(data, tmp_path, capsys):
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "2") == DONE
-    before = (run / "checkpoint.pt").read_bytes()
-    assert train(data, run, "--steps", "2") == BAD_INPUT
-    assert "--overwrite" in capsys.readouterr().err
-    assert (run / "checkpoint.pt").read_bytes() == before
-    assert train(data, run, "--steps", "3", "--overwrite") == DONE
-    assert load_checkpoint(run / "checkpoint.pt")["step"] == 3
+def test_an_existing_run_is_not_written_over(data, done, capsys):
+    before = contents(done)
+    assert train(data, done, "--steps", "2") == BAD_INPUT
+    assert "--overwrite" in capsys.readouterr().err and contents(done) == before
+    assert train(data, done, "--steps", "3", "--overwrite") == DONE
+    assert load_checkpoint(done / "checkpoint.pt")["step"] == 3
 
 
 def test_a_deterministic_run_goes_on_where_it_began(data, tmp_path, monkeypatch):
@@ -203,25 +161,6 @@ def test_bad_options_exit_with_2(data, tmp_path, capsys, options, word):
     assert main(["train", str(data), "--out", str(tmp_path / "run"), *options]) == BAD_INPUT
     assert word in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
-
-
-def test_evaluate_repeats_the_result_of_training(data_with_mesh, tmp_path):
-    data, run = data_with_mesh, tmp_path / "run"
-    assert train(data, run, "--steps", "25") == DONE
-    first = json.loads((run / "evaluation.json").read_text())
-    assets = {name: (run / name).stat().st_mtime_ns for name in ("mesh.ply", "mesh.glb", "environment.exr")}
-    assert main(["evaluate", str(run), "--data", str(data)]) == DONE
-    again = json.loads((run / "evaluation.json").read_text())
-    assert again["novel_view"]["psnr"] == pytest.approx(first["novel_view"]["psnr"], abs=0.05)
-    assert (
-        first["chamfer"] > 0
-        and again["f_score"] == pytest.approx(first["f_score"], abs=1e-3)
-        and again["relight"] is None
-    )
-    assert assets == {name: (run / name).stat().st_mtime_ns for name in assets}
-    kept, other = (run / "evaluation.json").read_bytes(), tmp_path / "other.json"
-    assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--out", str(other)]) == DONE
-    assert json.loads(other.read_text())["views"] == 1 and (run / "evaluation.json").read_bytes() == kept
 
 
 def test_the_paper_preset_takes_steps(data, tmp_path):

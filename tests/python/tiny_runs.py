@@ -39,9 +39,19 @@ def as_options(settings: dict[str, object]) -> list[str]:
     return [part for key, value in settings.items() for part in ("--set", f"{key}={json.dumps(value)}")]
 
 
+def command(*words: object) -> int:
+    """The exit code of `splitnerf` with these words."""
+    return main([str(word) for word in words])
+
+
 def train(data: Path, run: Path, *options: str) -> int:
     """`splitnerf train` with small settings; returns its exit code."""
     return main(["train", str(data), "--out", str(run), *as_options(SMALL), *options])
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    """What each file below a folder holds."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def lines_of(run: Path) -> list[dict]:
