@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import OpenImageIO as oiio
 from splitnerf.data.images import write_image
 
 SIZE = 48
@@ -66,6 +67,19 @@ def make_folders(root):
         (root / name / "metadata.json").write_text(json.dumps(meta))
     (root / "val_000").mkdir()
     return root
+
+
+def write_exr(path, pixels, names=None, window=None, primaries=None):
+    """An EXR of float32 pixels [h, w, c] of any values; `window` is left, top, and the whole image's width and height."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "float")
+    spec.channelnames = names or tuple("RGBA"[: pixels.shape[2]])
+    if window:
+        spec.x, spec.y, spec.full_width, spec.full_height = window
+    if primaries:
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), primaries)
+    sink = oiio.ImageOutput.create("any.exr")
+    assert sink.open(str(path), spec) and sink.write_image(pixels) and sink.close()
+    return path
 
 
 def edit(root, change, name="transforms_train.json"):

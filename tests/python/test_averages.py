@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from splitnerf.config import Config
-from splitnerf.data import pixels
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import area_average, linear_to_srgb, srgb_to_linear
 from splitnerf.data.pixels import Photos
@@ -55,20 +54,6 @@ def test_averages_are_what_a_downscale_reads(scene, data, tmp_path):
     assert small.known is None or np.array_equal(small.known, averaged.known)
 
 
-def test_averages_that_memory_has_no_room_for_go_to_a_file(data):
-    dataset = load_dataset(data)
-    in_file = dataset.averaged(2, 1e-6)
-    assert pixels.file_of(in_file.images.codes) is not None
-    assert np.array_equal(in_file.images.codes, dataset.averaged(2, 0.0).images.codes)
-
-
-def test_exposures_stay_with_the_photos(data):
-    dataset = load_dataset(data)
-    exposed = dataset.exposed(np.linspace(0.5, 2, len(dataset))).averaged(2, 0.0)
-    assert np.array_equal(exposed.images.exposures[:, 0], np.linspace(0.5, 2, len(dataset)).astype(np.float32))
-    assert np.array_equal(exposed.images.codes, dataset.averaged(2, 0.0).images.codes)
-
-
 def test_a_ray_of_an_average_meets_the_middle_of_its_block(data):
     """The origin and direction are those through the block's centre, and the colour is the block's mean."""
     dataset = load_dataset(data)
@@ -101,12 +86,6 @@ def test_a_pixel_is_at_most_as_wide_as_the_setting_says(wanted, factor, data):
     assert factor == 1 or width <= config.sampling.pixel_cells
     finer = config.replace({"growth": s.growth * 2 ** (1 / (s.n_levels - 1))})
     assert averaging_factor(dataset, finer) == max(1, factor // 2) or wanted == 9.0
-
-
-@pytest.mark.parametrize("wanted", [0.0, 1.5])
-def test_small_photos_and_the_setting_0_are_as_they_were(wanted, data):
-    dataset = load_dataset(data)
-    assert training_photos(dataset, averaging(dataset, wanted)) is dataset
 
 
 @pytest.mark.parametrize("shown, factor", [(0.6, 2), (0.0, 1)])

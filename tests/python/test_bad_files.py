@@ -11,10 +11,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 import trimesh
-from blender_data import SIZE, edit, make_blender, make_folders, set_pose
+from blender_data import SIZE, edit, make_blender, make_folders, set_pose, write_exr
 from gltf_builder import Gltf, beside, triangle
 from layout_scenes import (
     COLMAP_CAMERAS,
@@ -25,16 +24,16 @@ from layout_scenes import (
     write_text_model,
     write_transforms,
 )
-from PIL import Image
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import read_image, write_image
+from splitnerf.data.images import encode_png, read_image, write_image
 from splitnerf.data.truth import load_view_truths, read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.published import stanford_orb
 
 ENDLESS = 10**400
+DOWN = np.arange(SIZE)
 Damage = Callable[[Path], object]  # changes a folder; gives the path to be read where the form is one of files
 
 
@@ -84,9 +83,16 @@ def alpha(masks: Callable[[int], np.ndarray]) -> Damage:
     return write
 
 
-def negative_radiance(root: Path) -> None:
-    write_image(root / "train/r_0.exr", np.full((SIZE, SIZE, 4), -1.0, np.float32))
-    edit(root, lambda m: m["frames"][0].update(file_path="train/r_0.exr"))
+def floats(pixels: np.ndarray, name: str = "a.exr") -> Damage:
+    """An EXR file of any values, which `write_image` would look at."""
+    return lambda root: write_exr(root / name, pixels.astype(np.float32))
+
+
+def radiance(value: float) -> Damage:
+    """A photo of floats with one channel of one pixel of this value."""
+    pixels = np.ones((SIZE, SIZE, 4))
+    pixels[3, 4, 1] = value
+    return lambda root: [frame(file_path="train/r_1.exr")(root), floats(pixels, "train/r_1.exr")(root)]
 
 
 TRANSFORMS = {
@@ -95,8 +101,6 @@ TRANSFORMS = {
     "zero frames": (meta(lambda m: m["frames"].clear()), "transforms_train.json: has no frames"),
     "no angle": (meta(lambda m: m.pop("camera_angle_x")), "transforms_train.json: missing key 'camera_angle_x'"),
     "bad angle": (meta(lambda m: m.update(camera_angle_x="wide")), "'camera_angle_x' must be a positive number"),
-    "endless angle": (meta(lambda m: m.update(camera_angle_x=ENDLESS)), "'camera_angle_x' must be a positive number"),
-    "endless focal length": (meta(lambda m: m.update(fl_x=ENDLESS)), "'fl_x' must be a positive number"),
     "tiny width": (meta(lambda m: m.update(w=1e-300, fl_x=20)), "'w' must be a positive number"),
     "no file path": (meta(lambda m: m["frames"][1].pop("file_path")), "missing key 'file_path' in frame 1"),
     "no pose": (meta(lambda m: m["frames"][1].pop("transform_matrix")), "missing key 'transform_matrix' in frame 1"),
@@ -114,8 +118,7 @@ TRANSFORMS = {
     "mask's name too long": (frame(mask_path="x" * 5000), "no such image"),
     "one image twice": (frame(file_path="train/../train/r_2"), "r_2.png: two frames have this image; remove one"),
     **{
-        f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a positive number")
-        for x in ("bright", -1, 0, float("nan"))
+        f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a posit") for x in ("bright", -1, 0, np.nan)
     },
     **{f"gamma {x}": (frame(gamma=x), "'gamma' must be 0") for x in ("sRGB", -1, 0.5, float("nan"))},
     "no json": (file("transforms_train.json", b"{not json"), "transforms_train.json: is not valid json"),
@@ -124,26 +127,26 @@ TRANSFORMS = {
     "deep json": (file("transforms_train.json", b"[" * 100_000), "transforms_train.json: is not valid json"),
     "no folder": (shutil.rmtree, "data: no such folder"),
     "no transforms": (
-        lambda root: [path.unlink() for path in root.glob("*.json")],
-        "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model",
+        lambda root: [p.unlink() for p in root.glob("*.json")],
+        "neither transf.* nor .*.npz, nor a COLMAP",
     ),
     "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
     "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
     "larger image": (
-        picture("train/r_4.png", SIZE, SIZE + 4, 4),
-        f"r_4.png: is {SIZE + 4}x{SIZE}, r_0.png is {SIZE}x{SIZE}, and one lens is stated for both",
+        picture("train/r_4.png", SIZE, 52, 4),
+        "r_4.png: is 52x48, r_0.png is 48x48, and one lens is stated",
     ),
     "neither alpha nor mask": (
         picture("train/r_4.png", SIZE, SIZE, 3),
-        "r_4.png: has no alpha channel and its frame no mask_path",
+        "r_4.png: has no alpha channel and its frame no",
     ),
     "empty masks": (alpha(lambda i: np.zeros((SIZE, SIZE))), "train: every mask is empty"),
     "full masks": (alpha(lambda i: np.ones((SIZE, SIZE))), "train: nothing says where the object is"),
     "masks of no object": (
-        alpha(lambda i: np.outer(np.arange(SIZE) < 2 + i, np.arange(SIZE) >= SIZE - 2)),
-        "masks and poses contradict each other",
+        alpha(lambda i: np.outer(DOWN < 2 + i, DOWN >= SIZE - 2)),
+        "masks and poses contradict each",
     ),
-    "negative radiance": (negative_radiance, "r_0.exr: has NaN, infinite or negative pixels"),
+    **{f"radiance {x}": (radiance(x), "r_1.exr: has NaN, infinite or neg") for x in (np.nan, np.inf, -0.5)},
 }
 
 
@@ -152,21 +155,14 @@ def keys(**content: object) -> Damage:
 
 
 NERFSTUDIO = {
-    "mask of another size": (
-        picture("masks/v03.png.png", SIZE, 8),
-        f"v03.png.png: is 8x{SIZE}, its image v03.png is {SIZE}x{SIZE}",
-    ),
+    "mask of another size": (picture("masks/v03.png.png", SIZE, 8), "v03.png.png: is 8x48, its image v03.png is 48x48"),
     "mask of another kind": (keys(mask_kind="depth"), "'mask_kind' must be one of auto, object, ignore"),
-    "lens without a model": (
-        keys(camera_model="FOV"),
-        "transforms.json: camera model 'FOV' is not read; undistort the photos",
-    ),
+    "lens without a model": (keys(camera_model="FOV"), "transforms.json: camera model 'FOV' is not read; undistort"),
     "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
     "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),
     "decentred fisheye": (keys(camera_model="OPENCV_FISHEYE", p1=0.1), "a fisheye with 'p1' or 'p2' is not read"),
     "coefficient in words": (keys(k1="strong"), "'k1' is no coefficient of a lens: strong"),
     "coefficient NaN": (keys(k2=float("nan")), "'k2' is no coefficient of a lens: nan"),
-    "large coefficient": (keys(p2=1e9), "'p2' is no coefficient"),
     "endless coefficient": (keys(k1=ENDLESS), "'k1' is no coefficient"),
     "f-theta lens": (keys(ftheta_p1=0.3), "'ftheta_p1' is not read"),
     "rolling shutter": (keys(rolling_shutter=[0, 0, 0.1]), "'rolling_shutter' is not read"),
@@ -174,30 +170,21 @@ NERFSTUDIO = {
 }
 
 
-def view(change: Callable[[dict], object]) -> Damage:
-    return meta(change, "train_003/metadata.json")
+METADATA = "train_003/metadata.json"
+
+
+def matrix(*entries: object) -> Damage:
+    return meta(lambda m: m.update(cam_transform_mat=",".join(map(str, entries))), METADATA)
 
 
 VIEW_FOLDERS = {
-    "no matrix": (
-        view(lambda m: m.pop("cam_transform_mat")),
-        "train_003/metadata.json: missing key 'cam_transform_mat'",
-    ),
-    "no angle": (view(lambda m: m.pop("cam_angle_x")), "train_003/metadata.json: missing key 'cam_angle_x'"),
-    "twelve numbers": (
-        view(lambda m: m.update(cam_transform_mat=",".join("1" * 12))),
-        "train_003.*: cam_transform_mat is not a 4x4",
-    ),
-    "words": (
-        view(lambda m: m.update(cam_transform_mat=",".join(["one"] * 16))),
-        "train_003.*: cam_transform_mat is not a 4x4",
-    ),
-    "all zero": (
-        view(lambda m: m.update(cam_transform_mat=",".join("0" * 16))),
-        "train_003.*: cam_transform_mat is not a rigid",
-    ),
+    "no matrix": (meta(lambda m: m.pop("cam_transform_mat"), METADATA), f"{METADATA}: missing key 'cam_transform_mat'"),
+    "no angle": (meta(lambda m: m.pop("cam_angle_x"), METADATA), f"{METADATA}: missing key 'cam_angle_x'"),
+    "twelve numbers": (matrix(*[1] * 12), "train_003.*: cam_transform_mat is not a 4x4"),
+    "words": (matrix(*["one"] * 16), "train_003.*: cam_transform_mat is not a 4x4"),
+    "all zero": (matrix(*[0] * 16), "train_003.*: cam_transform_mat is not a rigid"),
     "no photo": (lambda root: (root / "train_003/rgba.png").unlink(), "train_003/rgba.png: no such image"),
-    "no metadata": (lambda root: (root / "train_003/metadata.json").unlink(), "train_003/metadata.json: no such file"),
+    "no metadata": (lambda root: (root / METADATA).unlink(), f"{METADATA}: no such file"),
 }
 
 
@@ -214,24 +201,16 @@ def cameras(content: dict) -> Damage:
     return write
 
 
+def first_camera(model: int, name: str, *parameters: float) -> Damage:
+    return cameras(COLMAP_CAMERAS | {1: (model, name, [9, 9], parameters)})
+
+
 COLMAP = {
-    "another camera model": (
-        cameras(dict.fromkeys((1, 7), (7, "FOV", [9, 9], [1.0] * 5))),
-        "camera model FOV is not read",
-    ),
+    "another camera model": (first_camera(7, "FOV", 1, 1, 1, 1, 1), "camera model FOV is not read"),
     "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
-    "no focal length": (
-        cameras({1: (1, "PINHOLE", [9, 9], [0.0, 1, 1, 1]), 7: COLMAP_CAMERAS[7]}),
-        "camera 1: 'fl_x' must be",
-    ),
-    "NaN": (
-        cameras({1: (3, "RADIAL", [9, 9], [9, 4, 4, np.nan, 0]), 7: COLMAP_CAMERAS[7]}),
-        "camera 1: 'k1' is no coefficient",
-    ),
-    "missing image": (
-        lambda root: (root / "images/v05.png").unlink(),
-        r"v05.png: no such image, with or without a suffix, though images.* lists it",
-    ),
+    "no focal length": (first_camera(1, "PINHOLE", 0, 1, 1, 1), "camera 1: 'fl_x' must be"),
+    "NaN": (first_camera(3, "RADIAL", 9, 4, 4, np.nan, 0), "camera 1: 'k1' is no coefficient"),
+    "missing image": (lambda root: (root / "images/v05.png").unlink(), "v05.png: no such image, with or without a suf"),
 }
 POINTS = 8 + struct.calcsize("<I7dI") + len("v08.png") + 1  # where the first image's number of points stands
 
@@ -271,10 +250,7 @@ NEUS = {
     "too few": (arrays(lambda a: a.pop(f"world_mat_{COUNT - 1}")), "image: has 16 images, cameras_sphere.npz has 15"),
     "none": (arrays(lambda a: [a.pop(f"world_mat_{i}") for i in range(COUNT)]), "needs world_mat_0"),
     "large": (arrays(lambda a: a.update(world_mat_2=np.zeros((400, 400)))), "has more than 4096 bytes"),
-    "an object": (
-        arrays(lambda a: a.update(world_mat_2=np.array([{}], object))),
-        "cannot be read as a file of NumPy arrays",
-    ),
+    "an object": (arrays(lambda a: a.update(world_mat_2=np.array([{}], object))), "cannot be read as a file of NumPy"),
 }
 
 
@@ -302,8 +278,15 @@ def png(width: int, height: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
 
 
+SUFFIXES = (".png", ".jpg", ".exr", ".hdr")
+
+
+def half(whole: bytes) -> bytes:
+    return whole[: len(whole) // 2]
+
+
 def write_images(root: Path) -> None:
-    for suffix in (".png", ".jpg", ".exr", ".hdr"):
+    for suffix in SUFFIXES:
         write_image(root / f"cut{suffix}", np.random.default_rng(2).random((64, 64, 3)).astype(np.float32))
 
 
@@ -313,37 +296,15 @@ WORDLESS = (
 )
 BITMAP = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
 IMAGES = {
-    **{
-        f"half {suffix}": (
-            rewritten(f"cut{suffix}", lambda whole: whole[: len(whole) // 2]),
-            f"cut{suffix}: .*(truncated|cannot be read)",
-        )
-        for suffix in (".png", ".jpg", ".exr", ".hdr")
-    },
+    **{f"half {s}": (rewritten(f"cut{s}", half), f"cut{s}: .*(truncated|cannot be read)") for s in SUFFIXES},
     "none": (lambda root: root / "gone.png", "gone.png: no such image"),
     "text": (file("a.png", b"no image"), "a.png: cannot be read"),
     "large PNG": (file("a.png", png(4000, 4000)), f"a.png: {CLAIMED}"),
     "large HDR": (file("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 4000\n"), f"a.hdr: {CLAIMED}"),
-    "too many pixels": (
-        file("a.png", png(20_000, 20_000) + bytes(300_000)),
-        "a.png: is 20000x20000, the most is 134 megapixels of 4",
-    ),
+    "too many pixels": (file("a.png", png(20_000, 20_000) + bytes(300_000)), "is 20000x20000, the most is 134 megapix"),
     "error that is no text": (file("a.exr", WORDLESS), "a.exr: cannot be read as an image"),
     "another format": (file("a.png", BITMAP), "a.png: cannot be read as an image"),
 }
-
-
-def floats(pixels: np.ndarray) -> Damage:
-    """An EXR file of any values, which `write_image` would look at."""
-
-    def write(root: Path) -> Path:
-        sink = oiio.ImageOutput.create(str(root / "a.exr"))
-        sink.open(str(root / "a.exr"), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.FLOAT))
-        sink.write_image(pixels.astype(np.float32))
-        sink.close()
-        return root / "a.exr"
-
-    return write
 
 
 def with_texel(value: float) -> Damage:
@@ -361,21 +322,14 @@ MAPS = {
     "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
     "square": (floats(np.ones((8, 8, 3))), "a.exr: is 8x8; an equirectangular map is twice as wide as high"),
     "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
-    "PNG": (
-        lambda root: [write_image(root / "a.png", np.ones((4, 8, 3))), root / "a.png"][1],
-        "a.png: .* must hold linear radiance",
-    ),
+    "PNG": (file("a.png", encode_png(np.ones((4, 8, 3)))), "a.png: .* must hold linear radiance"),
     "none": (lambda root: root / "b.hdr", "no such environment map"),
 }
 
 
-def flat(root: Path) -> Path:
-    trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(root / "flat.ply")
-    return root / "flat.ply"
-
-
+FLAT = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False).export(file_type="ply")
 MESHES = {
-    "flat": (flat, "flat.ply: degenerate or empty mesh"),
+    "flat": (file("flat.ply", FLAT), "flat.ply: degenerate or empty mesh"),
     "text": (file("a.ply", b"no mesh"), "a.ply: cannot be read as a mesh"),
     "none": (lambda root: root / "b.ply", "no such mesh"),
 }
@@ -433,6 +387,10 @@ def endless_factor(g: Gltf) -> None:
     g.json["meshes"][0]["primitives"][0]["material"] = g.material(name="m", pbrMetallicRoughness=pbr)
 
 
+def endless_zeros(g: Gltf) -> None:
+    g.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
+
+
 def one_vertex_for_all(g: Gltf) -> None:
     g.json["accessors"][0]["count"] = 10**9
     g.json["bufferViews"][0]["byteStride"] = 0
@@ -472,14 +430,11 @@ GLTF = {
     ),
     "NaN factor": (gltf(endless_factor), "material 'm' has a factor that is no usable number"),
     "no image": (gltf(broken_image), "image 0 'bad': cannot be read as an image"),
-    "endless zeros": (
-        gltf(lambda g: g.json["accessors"].__setitem__(0, {"componentType": 5126, "count": 10**9, "type": "VEC3"})),
-        UNPACKS,
-    ),
+    "endless zeros": (gltf(endless_zeros), UNPACKS),
     "one vertex for all": (gltf(one_vertex_for_all), f"{UNPACKS}|byteStride"),
     "many instances": (gltf(many_instances), UNPACKS),
     "no stride": (gltf(lambda g: g.json["bufferViews"][0].update(byteStride=0)), "byteStride"),
-    "half": (rewritten("a.glb", lambda whole: whole[: len(whole) // 2]), "truncated GLB"),
+    "half": (rewritten("a.glb", half), "truncated GLB"),
     "ten bytes": (rewritten("a.glb", lambda whole: whole[:10]), "truncated GLB"),
     "GLB 1": (rewritten("a.glb", lambda whole: whole[:4] + b"\1\0\0\0" + whole[8:]), "GLB version 1"),
     "another container": (rewritten("a.glb", lambda whole: b"glTX" + whole[4:]), "is neither a GLB nor glTF's JSON"),
@@ -487,10 +442,7 @@ GLTF = {
     "a list": (file("a.glb", b"[]"), "is JSON but not glTF"),
     "deep JSON": (file("a.gltf", b"[" * 100_000), "a.gltf: is neither"),
     "no file": (lambda root: root / "b.glb", "b.glb: no such file"),
-    "no buffer": (
-        lambda root: beside(root, "gone%20too.bin"),
-        "gone too.bin: no such file, though a.gltf refers to it",
-    ),
+    "no buffer": (lambda root: beside(root, "gone%20too.bin"), "gone too.bin: no such file, though a.gltf refers"),
     "a pipe": (lambda root: beside(root, "pipe.bin"), "pipe.bin: no such file"),
     **{
         f"outside by {uri}": (
@@ -502,21 +454,18 @@ GLTF = {
 }
 
 
-def load(folder: Path, _) -> object:
-    return load_dataset(folder)
-
-
 def of_file(read: Callable[[Path], object]) -> Callable[[Path, object], object]:
     return lambda _, path: read(path)
 
 
+LOADED = lambda folder, _: load_dataset(folder)  # noqa: E731
 FORMS = {  # what writes a good folder, what reads it or the path that the damage gives, and the table of damages
-    "transforms": (make_blender, load, TRANSFORMS),
-    "nerfstudio": (lambda root: write_transforms(root, masks=True), load, NERFSTUDIO),
-    "view folders": (make_folders, load, VIEW_FOLDERS),
-    "COLMAP, binary": (lambda root: write_colmap(root, binary=True), load, COLMAP | BINARY),
-    "COLMAP, text": (lambda root: write_colmap(root, binary=False), load, COLMAP),
-    "NeuS": (write_neus, load, NEUS),
+    "transforms": (make_blender, LOADED, TRANSFORMS),
+    "nerfstudio": (lambda root: write_transforms(root, masks=True), LOADED, NERFSTUDIO),
+    "view folders": (make_folders, LOADED, VIEW_FOLDERS),
+    "COLMAP, binary": (lambda root: write_colmap(root, binary=True), LOADED, COLMAP | BINARY),
+    "COLMAP, text": (lambda root: write_colmap(root, binary=False), LOADED, COLMAP),
+    "NeuS": (write_neus, LOADED, NEUS),
     "Stanford-ORB": (write_capture, lambda root, _: stanford_orb.relit(root / "a"), STANFORD_ORB),
     "image": (write_images, of_file(read_image), IMAGES),
     "map": (Path.exists, of_file(read_environment), MAPS),
@@ -549,32 +498,3 @@ def test_bad_files_give_one_line_that_names_them(good, tmp_path, form, case):
         read(tmp_path / "data", path)
     line = str(caught.value)
     assert line.startswith((str(tmp_path), "/: ")) and len(line) < 6000
-
-
-# ---- what looks bad and is not ----
-
-
-@pytest.mark.parametrize(
-    "uri",
-    [
-        "sub/the%20data.bin",
-        "./sub/../sub/the%20data.bin",
-        "inside.bin",
-        "data:application/octet-stream;base64,{inline}",
-    ],
-)
-def test_gltf_below_its_folder_is_read(tmp_path, uri):
-    whole = read_asset(triangle().write(tmp_path / "a.glb"))
-    assert np.array_equal(read_asset(beside(tmp_path, uri)).vertices, whole.vertices)
-
-
-def test_a_buffer_that_nothing_uses_may_be_missing(tmp_path):
-    unused = {"uri": "x" * 5000, "byteLength": 4}
-    change = gltf(lambda g: g.json.update(buffers=[{"byteLength": len(g.binary)}, unused]))
-    assert len(read_asset(change(tmp_path)).triangles) == 1
-
-
-def test_a_black_mask_of_one_bit_a_pixel_is_as_small_as_that(tmp_path):
-    Image.new("1", (2000, 2000)).save(tmp_path / "mask.png", optimize=True)
-    assert (tmp_path / "mask.png").stat().st_size < 2000**2 / 4096
-    assert read_image(tmp_path / "mask.png").shape == (2000, 2000, 1)

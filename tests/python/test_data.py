@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha
+from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
@@ -18,20 +18,6 @@ from splitnerf.errors import InputError
 from splitnerf.refinement.pixels import covered_pixels
 
 REAL = Path(os.environ.get("SPLITNERF_DATA", "../shared/data"))
-
-
-def make_single(root, count=16):
-    """The same sphere as JPEGs with masks in one transforms.json, intrinsics given for twice the size."""
-    frames = []
-    for i, pose in enumerate(poses_around(np.zeros(3), 1.0, count)):
-        write_image(root / f"images/f{i}.jpg", np.full((SIZE, SIZE, 3), 0.5))
-        write_image(root / f"masks/f{i}.png", sphere_alpha(pose, np.zeros(3), 1.0))
-        files = {"file_path": f"images/f{i}.jpg", "mask_path": f"masks/f{i}.png"}
-        frames.append(files | {"transform_matrix": pose.tolist()})
-    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
-    lens = {"fl_x": 2 * focal, "fl_y": 2 * focal, "cx": SIZE + 2, "cy": SIZE, "w": 2 * SIZE, "h": 2 * SIZE}
-    (root / "transforms.json").write_text(json.dumps(lens | {"frames": frames}))
-    return root
 
 
 @pytest.fixture
@@ -47,17 +33,6 @@ def test_blender_layout(scene):
     focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
     assert data.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert np.array_equal(data.box_from_world, np.eye(4))
-
-
-def test_single_file_layout_takes_every_eighth_frame_for_testing(tmp_path):
-    root = make_single(tmp_path)
-    train, test = load_dataset(root, "train"), load_dataset(root, "test", downscale=2)
-    assert test.frame_names == ["f0", "f8"]
-    assert len(train) == 14 and not set(train.frame_names) & {"f0", "f8"}
-    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
-    assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2 + 1, SIZE / 2])
-    assert test.intrinsics[0] == pytest.approx(train.intrinsics[0] / 2)
-    assert set(np.unique(train.images[..., 3])) == {0, 1}
 
 
 def test_view_folders(tmp_path):
@@ -80,13 +55,6 @@ def test_view_folders(tmp_path):
     assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
 
 
-def test_select_keeps_views_in_order(scene):
-    data = load_dataset(scene)
-    chosen = data.select([5, 2])
-    assert chosen.frame_names == ["r_5", "r_2"] and [path.stem for path in chosen.image_paths] == ["r_5", "r_2"]
-    assert np.array_equal(chosen.poses, data.poses[[5, 2]]) and len(chosen) == 2
-
-
 def test_downscale_divides_size_and_intrinsics(scene):
     data = load_dataset(scene, "train", downscale=5)
     assert data.images.shape[1:3] == (SIZE // 5, SIZE // 5)
@@ -106,26 +74,12 @@ def test_far_small_object_is_brought_into_the_box(tmp_path):
     assert data.transform_to_world(data.poses[3, :3, 3]) == pytest.approx(world[:3, 3], abs=1e-4)
 
 
-def test_object_beside_the_optical_axes_is_found(tmp_path):
-    centre, radius = np.array([2.0, 0.0, 1.0]), 0.5
-    data = load_dataset(make_blender(tmp_path / "aside", centre, radius, aim=centre + [0.2, -0.1, 0.3]))
-    inside = data.box_from_world[:3, :3] @ centre + data.box_from_world[:3, 3]
-    assert np.linalg.norm(inside) < 0.15
-    assert 0.8 < data.box_from_world[0, 0] * radius <= 1.05
-
-
 def test_another_internal_frame_changes_no_place_in_the_world(tmp_path):
     data = load_dataset(make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05))
     assert data.in_box(data.box_from_world.copy()) is data
     other = data.in_box(np.diag([2.0, 2, 2, 1]) + 0.5 * np.eye(4, k=3))
     assert other.world_poses == pytest.approx(data.world_poses, abs=1e-5)
     assert other.poses[:, 0, 3] == pytest.approx(2 * data.world_poses[:, 0, 3] + 0.5, abs=1e-5)
-
-
-def test_splits_and_downscales_share_one_frame(tmp_path):
-    root = make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05)
-    frames = [load_dataset(root, split, factor).box_from_world for split in ("train", "test") for factor in (1, 3)]
-    assert all(np.array_equal(frame, frames[0]) for frame in frames)
 
 
 def test_fingerprint_tells_scenes_apart_and_not_folders(scene, tmp_path):

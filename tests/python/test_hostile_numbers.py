@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from gltf_builder import triangle
-from splitnerf.data.gltf import read_asset
-from splitnerf.errors import InputError
 from splitnerf.fields.visibility import bit_counts
 from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.ops._library import lib
@@ -26,15 +23,10 @@ def ball() -> MeshScene:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, 1e18, 3e38])
-def test_vertices_out_of_reach_are_refused(tmp_path, value):
+def test_vertices_out_of_reach_are_refused(value):
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, value, 0]], np.float32)
     with pytest.raises(ValueError, match="Scene: vertex 2 is not finite, or farther than 1e12"):
         MeshScene(vertices, np.array([[0, 1, 2]]))
-    if value == 1e18:
-        gltf = triangle()
-        gltf.node(mesh=0, scale=[value] * 3)
-        with pytest.raises(InputError, match="asset.glb: has vertices farther than 1e.12 from the origin"):
-            read_asset(gltf.write(tmp_path / "asset.glb"))
 
 
 @pytest.mark.parametrize("value", BAD)

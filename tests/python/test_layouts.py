@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-import struct
-
 import numpy as np
 import pytest
 from blender_data import SIZE, edit, make_blender, sphere_alpha
-from layout_scenes import (
-    CENTRE,
-    COUNT,
-    FOCAL,
-    LENS,
-    RADIUS,
-    sphere_poses,
-    world_to_camera,
-    write_colmap,
-    write_neus,
-    write_transforms,
-)
+from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, write_colmap, write_neus, write_transforms
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import write_image
-from splitnerf.data.layouts.neus import decompose
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -72,15 +58,6 @@ def test_masks_of_colmap_are_found_by_both_names(tmp_path):
     assert all(frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.name) for frame in frames)
 
 
-def test_the_largest_of_several_models_is_read(tmp_path, capsys):
-    write_colmap(tmp_path, binary=True, place="sparse/1")
-    (tmp_path / "sparse/0").mkdir()
-    (tmp_path / "sparse/0/cameras.bin").write_bytes(struct.pack("<Q", 0))
-    (tmp_path / "sparse/0/images.bin").write_bytes(struct.pack("<Q", 0))
-    assert len(load_dataset(tmp_path)) == COUNT - 2
-    assert f"{tmp_path}: has 2 COLMAP models; the one with the most images is read" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("binary", [True, False])
 def test_images_in_folders_have_their_masks_in_folders(tmp_path, binary):
     """Here through a lens that bends, whose parameters a model names."""
@@ -115,26 +92,6 @@ def test_each_camera_model_of_colmap(tmp_path, binary, number, name, parameters,
     bent = frames[0].distortion
     assert tuple(lens_intrinsics(frames[0].lens, (SIZE, SIZE))) == pytest.approx(expected[0])
     assert (bent.radial, bent.tangential, bent.fisheye) == expected[1:]
-
-
-def test_a_projection_is_taken_apart():
-    k = np.array([[900.0, 0, 320.25], [0, 910.0, 239.75], [0, 0, 1]])
-    for pose in sphere_poses(5):
-        for factor in (1.0, -1.0, 1e-6, -3e5):
-            matrix = np.eye(4)
-            matrix[:3] = factor * (k @ world_to_camera(pose)[:3])
-            intrinsics, found = decompose(matrix, "it")
-            assert intrinsics == pytest.approx([900, 910, 320.75, 240.25]) and found == pytest.approx(pose, abs=1e-9)
-
-
-def test_lists_of_nerfstudio_make_the_splits(tmp_path):
-    root = write_transforms(
-        tmp_path, train_filenames=[f"images/v{i:02d}.png" for i in range(10)], val_filenames=["./images/v12.png"]
-    )
-    assert load_dataset(root).frame_names == [f"v{i:02d}" for i in range(10)]
-    assert load_dataset(root, "test").frame_names == ["v12"] and has_test_split(root)
-    edit(root, lambda m: m.pop("val_filenames"), "transforms.json")
-    assert not has_test_split(root)
 
 
 # ---- what is held out ----

@@ -70,15 +70,6 @@ def test_quadratic_functions_are_met_exactly_between_pixels():
     np.testing.assert_allclose(found[..., 0], quadratic(*np.moveaxis(places, -1, 0)), atol=2e-5)
 
 
-def test_a_photo_that_ends_is_unknown_beyond():
-    """A lens that bends outwards shows less of the corners than a pinhole does, and nothing is made up there."""
-    photo = np.ones((HEIGHT, WIDTH, 1), np.float32)
-    _, known = undistort(photo, distortion({"k1": 0.2}), np.array(CAMERA))
-    assert not known[0, 0] and not known[-1, -1] and known[HEIGHT // 2, WIDTH // 2]
-    _, known = undistort(photo, distortion({"k1": -0.2}), np.array(CAMERA))
-    assert known.all()
-
-
 def test_a_polynomial_that_folds_back_shows_no_second_image():
     """1 - 1.5 r^2 grows up to r = 0.4714, and is back in the photo's middle at r = 0.8."""
     lens = Distortion((-1.5, 0.0, 0.0, 0.0))

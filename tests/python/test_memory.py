@@ -15,10 +15,10 @@ from splitnerf.cli.exit_codes import BAD_INPUT
 from splitnerf.data import loading, pixels
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.images import read_image
-from splitnerf.data.pixels import Photos, PixelReader, decoded, encoded, file_of
+from splitnerf.data.pixels import decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
-from splitnerf.ops import EdgeRuns, draw_rays
+from splitnerf.ops import draw_rays
 from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
 from splitnerf.training import loop
 from tiny_runs import tiny
@@ -49,11 +49,6 @@ def test_codes_stand_for_the_values_they_are_rounded_from(dtype, most):
     assert np.abs(decoded(encoded(values, dtype)) - values).max() < 0.5001 / most
 
 
-def test_bytes_become_words_exactly():
-    codes = np.arange(256).astype(np.uint8)
-    assert np.allclose(decoded(encoded(codes, np.uint16)), codes / 255, atol=1e-7)
-
-
 def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
     """Equal bits of the pixels, of the fingerprint, and of what some steps learn."""
     reading, folder = in_file
@@ -79,30 +74,6 @@ def test_the_budget_counts_what_is_there_already(random_codes):
     assert before - pixels.room_for_photos(1.0) == array.nbytes == 400_000
     del array
     assert pixels.room_for_photos(1.0) == before
-
-
-def test_single_pixels_are_those_of_the_photos(random_codes):
-    exposures = np.array([1.0, 0.5, 2.0])
-    for codes in (random_codes, encoded(random_codes, np.uint16), decoded(random_codes)):
-        photos = Photos(codes, exposures)
-        index = torch.randperm(3 * 5 * 7)
-        factors, behind = torch.from_numpy(exposures[:, None].repeat(3, 1)).float(), torch.rand(len(index), 3)
-        read = PixelReader(photos, CPU).read(index, index // 35, factors, behind, EdgeRuns.none(CPU))
-        assert np.array_equal(read[0].numpy(), decoded(codes).reshape(-1, 4)[index.numpy()])
-        assert torch.equal(read[1], factors[index // 35]) and torch.equal(read[2], behind) and not read[3].any()
-
-
-def test_exposure_divides_linear_light(random_codes):
-    """A photo of twice the exposure shows half its light; alpha stays."""
-    photos = Photos(np.full((1, 1, 1, 4), 188, np.uint8), np.array([2.0]))
-    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4 / 2
-    assert photos[0, 0, 0, 0] == photos[0][0, 0, 0] and photos[..., 3] == pytest.approx(188 / 255)
-    assert photos[0][0, 0] == pytest.approx([1.055 * linear ** (1 / 2.4) - 0.055] * 3 + [188 / 255], abs=1e-5)
-
-
-def test_a_selection_keeps_order_and_exposure(random_codes):
-    photos = Photos(random_codes, np.array([1.0, 0.5, 2.0]))
-    assert np.array_equal(photos.select([2, 0]), np.stack([photos[2], photos[0]]))
 
 
 def test_one_photo_must_fit(tmp_path):
