@@ -163,18 +163,7 @@ def test_the_reference_holds_every_operator():
     reason="Sphinx is not there: pip install splitnerf[docs]",
 )
 def test_the_pages_build_without_a_warning(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-b",
-        "html",
-        str(ROOT / "docs"),
-        str(tmp_path),
-    ]
+    command = [sys.executable, *"-m sphinx -W --keep-going -q -b html".split(), str(ROOT / "docs"), str(tmp_path)]
     built = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
     assert built.returncode == 0, built.stderr
     page = (tmp_path / "reference" / "rays.html").read_text()

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 import trimesh
 from painted_ball import lamps, looking, orange
 from splitnerf.cli import main
@@ -90,31 +89,6 @@ def test_nerf(run, tmp_path):
     out = run("nerf.py", str(data), "--steps", "200", "--rays", "200", "--out", str(picture))
     assert number(r"views: ([\d.]+) dB", out) > 19
     assert read_image(picture).shape == (64, 64, 3)
-
-
-def test_the_nerf_weighs_as_a_density_does():
-    """Its weights against w_i = T_i (1 - exp(-density_i length_i)), T_i the product of what came before, in float64."""
-    names = runpy.run_path(str(EXAMPLES / "nerf.py"))
-    generator = torch.Generator().manual_seed(0)
-    lengths, counts = torch.rand(300, generator=generator) * 0.05, torch.tensor([0, 100, 1, 199])
-    density = 10 ** (torch.rand(300, generator=generator) * 5 - 2)  # 0.01 to 1000
-    density.requires_grad_()
-    offsets = torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)])
-    ray_indices = torch.repeat_interleave(torch.arange(4), counts)
-    samples = names["PackedSamples"](ray_indices, torch.zeros(300), lengths, offsets)
-    weights, opacity = names["density_weights"](density, samples)
-    exact = density.detach().double().requires_grad_()
-    expected = []
-    for depth in (exact * lengths.double()).split(counts.tolist()):
-        before = torch.cat([depth.new_zeros(1), depth.cumsum(0)])[: len(depth)]
-        expected.append(torch.exp(-before) * -torch.expm1(-depth))
-    expected = torch.cat(expected)
-    assert (weights - expected).abs().max() < 1e-5
-    assert opacity.tolist() == pytest.approx([x.sum().item() for x in expected.split(counts.tolist())], abs=2e-4)
-    pull = torch.rand(300, generator=generator)
-    (weights * pull).sum().backward()
-    (expected * pull).sum().backward()
-    assert (density.grad - exact.grad).abs().max() < 1e-3 * exact.grad.abs().max()
 
 
 def plane_under_a_ball(height: float) -> tuple[trimesh.Trimesh, int]:
@@ -205,18 +179,3 @@ def test_slurm_batch(run, data, tmp_path, monkeypatch):
         [sys.executable, "-c", WARNED, str(EXAMPLES / "slurm_batch.py")], capture_output=True, text=True, timeout=120
     )
     assert warned.stdout == f"Training ('a', 'b', ['c']) {-signal.SIGTERM}\n", warned.stderr
-
-
-def test_a_scene_called_as_the_folder_of_jobs_is_refused(tmp_path):
-    pytest.importorskip("submitit", reason="submitit is not installed: pip install submitit")
-    words = [
-        sys.executable,
-        str(EXAMPLES / "slurm_batch.py"),
-        str(tmp_path / ".jobs"),
-        "--out",
-        str(tmp_path / "out"),
-        "--cluster",
-        "local",
-    ]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2 and "a scene is called .jobs" in done.stderr and not (tmp_path / "out").exists()

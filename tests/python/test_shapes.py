@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench import shapes as bench
-from bench import tables
 from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -157,38 +155,3 @@ def test_wrong_names_are_refused_in_a_line_that_lists_the_right_ones(words, list
 def test_a_material_needs_a_shape(tmp_path, capsys):
     words = f"synth a.glb --material metal --light l.hdr --out {tmp_path / 'o'}"
     assert main(words.split()) == BAD_INPUT and "give --shape" in capsys.readouterr().err
-
-
-def test_the_table_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
-    """The program with commands that only write down what is asked; training on the metal mug fails at first."""
-    asked, faulty = [], ["mug_metal"]
-
-    def command_of(name, *words):
-        data = words[0] if name == "train" else words[words.index("--out") + 1]
-        asked.append((name, data.name))
-        data.mkdir(parents=True, exist_ok=True)
-        (data / "transforms_test.json").touch()
-        return name == "synth" or data.name not in faulty
-
-    scores = {"f_score": 0.98765, "chamfer": 0.01, "normal_mae_deg": 4.21, "novel_view": {"psnr": 30.06}}
-    monkeypatch.setattr(bench, "splitnerf", command_of)
-    monkeypatch.setattr(bench, "read_evaluation", lambda run: scores | {"albedo": None, "light_psnr": None})
-
-    def rows(*options: str) -> tuple[int, list]:
-        words = [tmp_path / "work", "--materials", "metal", "--out", tmp_path, *options]
-        monkeypatch.setattr("sys.argv", ["shapes.py", *map(str, words)])
-        asked.clear()
-        return bench.main(), [row["shape"] for row in bench.read_rows(tmp_path / "shapes.csv")]
-
-    assert rows("--only", "mug", "box") == (1, ["box"])
-    assert asked == [(name, f"{shape}_metal") for shape in ("mug", "box") for name in ("synth", "train")]
-    faulty.clear()
-    assert rows("--only", "mug", "box") == (0, ["mug", "box"]) and asked == [("train", "mug_metal")]
-    assert rows("--only", "box", "--again") == (0, ["mug", "box"])
-    assert asked == [("synth", "box_metal"), ("train", "box_metal")]
-    assert rows("--only", "box", "--minutes", "2") == (0, ["mug", "box", "box"]) and asked == [("train", "box_metal")]
-    first = bench.read_rows(tmp_path / "shapes.csv")[0]
-    assert [first[column] for column in bench.SCORES] == ["0.988", "0.0100", "4.2", "30.1", "", ""]
-    page = (tmp_path / "shapes.md").read_text()
-    assert f"| mug | metal | 4 | {first['images']} | 0.988 | 0.0100 | 4.2 | 30.1 | - | - |" in page
-    assert tables.HEAD.search(page)["commit"] == first["commit"].rstrip("+")

@@ -1,4 +1,4 @@
-"""The page of a run in Chromium: while it trains, when the connection is cut, and with assets that are large or damaged.
+"""The page of a run in Chromium: while it trains, and when the connection is cut.
 
 Skipped where Node, Chromium or the packages of the page's sources (`npm ci` there, or `make viewer`) are missing.
 """
@@ -15,10 +15,8 @@ import numpy as np
 import pytest
 import torch
 from looking_at import keys, look_at, needs_chromium, picture, serving, text, wait
-from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.export.glb import write_glb
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import Event, together
@@ -211,59 +209,3 @@ def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monke
         )["texts"]
     assert told["said"] == "the connection broke off; what was missing is asked for again once splitnerf answers"
     assert len(asked) == 2
-
-
-@pytest.mark.slow
-def test_a_glb_of_200_megabytes_loads(tmp_path):
-    """Of 3.4 million triangles; the time and the browser's memory are printed."""
-    n = 1310  # points along an edge of a bent sheet
-    u, v = np.meshgrid(np.linspace(-1, 1, n, dtype=np.float32), np.linspace(-1, 1, n, dtype=np.float32))
-    vertices = np.stack([u, v, 0.3 * np.sin(9 * u) * np.cos(9 * v)], axis=2).reshape(-1, 3)
-    corners = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    triangles = np.concatenate([corners[:, None] + [0, 1, n], corners[:, None] + [1, n + 1, n]]).astype(np.int32)
-    normals = np.broadcast_to(np.float32([0, 0, 1]), vertices.shape).copy()
-    noise = np.random.default_rng(0).random((6000, 6000, 3), np.float32)  # PNG cannot make it smaller
-    asset = Asset(
-        "large",
-        vertices,
-        triangles,
-        normals,
-        np.zeros(len(triangles), np.int32),
-        [Material(albedo_texture=noise)],
-        uv=(0.5 + 0.5 * vertices[:, :2]).astype(np.float32),
-    )
-    write_glb(tmp_path / "large.glb", asset)
-    assert (tmp_path / "large.glb").stat().st_size > 200e6
-    clock = time.monotonic()
-    with serving(ViewServer(ViewedAssets([tmp_path / "large.glb"]))) as server:
-        read, clock = time.monotonic() - clock, time.monotonic()
-        told = look_at(
-            server.url,
-            [
-                {"do": "size", "width": 400, "height": 300} | RESTLESS,
-                {"do": "open"} | RESTLESS,
-                text("said", SAID, **RESTLESS),
-                lambda: print(f"read in {read:.1f} s, in the page after {time.monotonic() - clock:.1f} s"),
-                text("heap", "Math.round(performance.memory.usedJSHeapSize / 1e6)", **RESTLESS),
-                picture(tmp_path / "large.png", **RESTLESS),
-            ],
-        )
-    print(f"the page's memory of scripts: {told['texts']['heap']} MB")
-    assert told["texts"]["said"] == ""
-    assert np.ptp(pixels(tmp_path / "large.png")[100:200, 30:100].reshape(-1, 3), axis=0).max() > 0.1
-
-
-def test_an_asset_without_a_light_is_shown(tmp_path):
-    triangle().write(tmp_path / "mesh.glb")
-    live = Live("mine")
-    live(Event("export", path=tmp_path))
-    with serving(ViewServer(live.shown, live=live)) as server:
-        told = look_at(
-            server.url,
-            [
-                {"do": "size", "width": 500, "height": 400} | RESTLESS,
-                {"do": "open"} | RESTLESS,
-                text("said", SAID, **RESTLESS),
-            ],
-        )["texts"]
-    assert told["said"] == ""
