@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 import trimesh
+from blender_data import look_at
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import turn_environment
@@ -71,11 +72,13 @@ def sky(height: int = 16) -> np.ndarray:
 def looking(azimuth: float, elevation: float, distance: float = 3.4) -> np.ndarray:
     """[4, 4] camera-to-world of a camera that looks at the origin, OpenGL axes."""
     back = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    right = np.cross([0, 0, 1], back)
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3] = np.column_stack([right, np.cross(back, right), back, distance * back])
-    return pose.astype(np.float32)
+    return look_at(distance * back, np.zeros(3)).astype(np.float32)
+
+
+def bare(mesh: trimesh.Trimesh, *materials: Material) -> Asset:
+    """A mesh without texture coordinates."""
+    vertices, faces, normals = np.float32(mesh.vertices), np.int32(mesh.faces), np.float32(mesh.vertex_normals)
+    return Asset("bare", vertices, faces, normals, np.zeros(len(faces), np.int32), list(materials))
 
 
 def photos(

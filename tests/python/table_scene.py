@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from blender_data import look_at
 from PIL import Image
 
 BALL, RADIUS = np.array([0.0, 0.0, 0.5]), 0.5
@@ -36,11 +37,7 @@ def ring(n: int, distance: float = 3.0) -> np.ndarray:
     for i in range(n):
         azimuth, height = 2 * np.pi * i / n, np.radians(38 + 12 * np.sin(6 * np.pi * i / n))
         back = np.array([np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)])
-        right = np.cross([0, 0, 1.0], back)
-        right /= np.linalg.norm(right)
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = np.stack([right, np.cross(back, right), back], axis=1), BALL + distance * back
-        poses.append(pose)
+        poses.append(look_at(BALL + distance * back, BALL))
     return np.array(poses)
 
 

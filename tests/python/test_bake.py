@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from splitnerf.data.tangents import vertex_tangents
 from splitnerf.export import surface
-from splitnerf.export.bake import Spread, UnwrappedMesh, bake_occlusion, rasterise, to_tangent_space
+from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
 from splitnerf.export.textured import textured_asset
@@ -162,30 +162,6 @@ def test_charts_are_small_and_fill_a_large_texture():
     assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
 
 
-def test_what_lies_outside_takes_the_nearest_value():
-    image = Spread(np.array([0, 15]), 4)(np.array([[1.0, 2.0], [3.0, 4.0]]))
-    assert image.dtype == np.float32 and image.shape == (4, 4, 2)
-    assert image[1, 1].tolist() == [1, 2] and image[2, 3].tolist() == [3, 4]
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_tangent_space_is_undone_by_its_decoder(sign):
-    rng = np.random.default_rng(0)
-    normals = rng.normal(size=(500, 3))
-    normals *= rng.uniform(0.7, 1, (500, 1)) / np.linalg.norm(normals, axis=1, keepdims=True)  # as interpolated
-    tangents = np.cross(normals, rng.normal(size=(500, 3)))
-    tangents = np.column_stack([tangents / np.linalg.norm(tangents, axis=1, keepdims=True), np.full(500, sign)])
-    world = normals + 0.5 * rng.normal(size=(500, 3))
-    world = world[keep := (world * normals).sum(axis=1) > 0.3]
-    normals, tangents = normals[keep], tangents[keep]
-    local = to_tangent_space(world, normals, tangents)
-    bitangents = tangents[:, 3:] * np.cross(normals, tangents[:, :3])
-    decoded = local[:, :1] * tangents[:, :3] + local[:, 1:2] * bitangents + local[:, 2:] * normals
-    assert angle(decoded, world).max() < 1e-2
-    raised = to_tangent_space(-0.01 * normals, normals, tangents)
-    assert (raised[:, 2] > 0).all() and np.linalg.norm(raised, axis=1) == pytest.approx(1.0, abs=1e-6)
-
-
 def test_points_move_onto_the_level_set_and_never_away():
     """f = |x|^2 - 1 is no distance: Newton and the secant still land; what is out of reach stays inside it."""
 
@@ -207,25 +183,6 @@ def test_points_move_onto_the_level_set_and_never_away():
     assert np.array_equal(
         to_level_set(squares, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
     )
-
-
-def test_steps_that_lead_astray_are_not_taken():
-    """A field that rises and falls: nobody ends where it is larger than where it began, whatever the number at a time."""
-
-    def field(x):
-        r = x.norm(dim=1)
-        return r - 0.8 + 0.06 * (37 * r).sin()
-
-    rng = np.random.default_rng(2)
-    points = rng.normal(size=(400, 3))
-    points = np.float32(points / np.linalg.norm(points, axis=1, keepdims=True) * rng.uniform(0.6, 1.0, (400, 1)))
-    lines = np.float32(points / np.linalg.norm(points, axis=1, keepdims=True))
-    moved = to_level_set(surface_of(field), points, 0.3, lines)
-    before, after = (field(torch.from_numpy(x)).abs() for x in (points, moved))
-    assert (after <= before + 1e-6).all() and after.median() < 0.2 * before.median()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(surface, "CHUNK", 70)
-        assert to_level_set(surface_of(field), points, 0.3, lines) == pytest.approx(moved, abs=1e-6)
 
 
 def test_materials_that_are_not_finite_are_refused():

@@ -5,12 +5,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 import torch
 from splitnerf.ops import EdgeRuns, read_pixels
 from splitnerf.render.edges import EdgePixels
 from splitnerf.render.rays import DrawnRays
-from splitnerf.training.batches import draw_batch, draw_numbers
+from splitnerf.training.batches import draw_batch
 from tiny_runs import tiny
 
 
@@ -53,15 +52,6 @@ def test_what_is_drawn_fills_its_range():
     assert batch.probes.chosen.shape == (3000,) and shifts.shape == (3000, 3)
     assert shifts.mean(0).abs().max() < 0.005
     torch.testing.assert_close(shifts.T.cov(), 0.05**2 * torch.eye(3), rtol=0, atol=0.1 * 0.05**2)
-
-
-@pytest.mark.parametrize("counts", [[1], [2, 0, 5], [7, 7, 21, 3]])
-def test_numbers_are_drawn_together_and_begin_where_no_operator_copies_them(counts):
-    parts = draw_numbers(torch.Generator().manual_seed(0), counts)
-    assert [len(part) for part in parts] == counts
-    assert all(part.storage_offset() * part.element_size() % 16 == 0 for part in parts)
-    drawn = torch.cat(parts)
-    assert len(drawn.unique()) == len(drawn) and 0 <= drawn.min() and drawn.max() < 1
 
 
 def test_whole_pixels_are_seen_before_what_lies_behind_them():

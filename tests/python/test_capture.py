@@ -61,18 +61,8 @@ def found_scene(n: int = 12) -> tuple[Reconstruction, np.ndarray]:
     table = table[np.linalg.norm(table[:, :2], axis=1) > 0.5]
     far = random.normal(size=(200, 3)) * 10 + 20
     points = np.concatenate([ball, table, far])
-    poses = ring(n)
-    scene = Reconstruction(
-        [f"p_{i:02d}" for i in range(n)],
-        poses,
-        [PLAIN] * n,
-        points,
-        np.zeros(0, int),
-        np.zeros(0, int),
-        np.zeros((0, 2)),
-        error=0.3,
-        n_models=1,
-    )
+    names, seen = [f"p_{i:02d}" for i in range(n)], (np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
+    scene = Reconstruction(names, ring(n), [PLAIN] * n, points, *seen, error=0.3, n_models=1)
     return scene, np.arange(len(points)) < len(ball)
 
 

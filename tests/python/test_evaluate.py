@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import srgb_to_linear, write_image
+from splitnerf.data.images import write_image
 from splitnerf.data.relit import map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
-from splitnerf.evaluate.relight import RelitViews, relight_scores, straight_srgb
+from splitnerf.evaluate.relight import RelitViews, relight_scores
 from splitnerf.evaluate.score_table import evaluation_table
 from splitnerf.evaluate.scoring import Protocol, choose_views
 from splitnerf.evaluate.similarity import ScaledView, scaled_scores
@@ -45,18 +45,6 @@ def test_only_foreground_of_both_counts_for_the_scale_and_values_are_clipped():
     bright = [view("a", 0.8, 1.0), view("a", 0.8, 2.2)]
     # The fit is 2, the scaled prediction 1.6, clipped to white as the truth is: no error is left.
     assert scaled_scores(lambda: bright)[0]["psnr"] == 100
-
-
-def test_lpips_is_asked_for_the_headline_alone():
-    asked = []
-
-    def distance(image, truth):
-        asked.append(image.shape)
-        return 0.25
-
-    scores, groups = scaled_scores(lambda: [view("a", 0.5, 0.5), view("b", 0.5, 0.5)], distance)
-    assert scores["lpips"] == scores["lsq"]["lpips"] == groups["a"]["lpips"] == 0.25
-    assert scores["raw"]["lpips"] is None and len(asked) == 2
 
 
 @pytest.fixture
@@ -145,13 +133,6 @@ def test_relit_images_are_scored_with_one_scale_and_per_map(views):
         image[..., :3] = 51
     relit = relight_scores(RelitViews(images, views, 8))
     assert relit["maps"]["my_sun"]["psnr"] > relit["psnr"] > relit["maps"]["city"]["psnr"]
-
-
-def test_renderings_become_straight_srgb():
-    alpha = np.array([[0.5, 1.0, 0.0]], np.float32)
-    radiance = np.repeat(np.array([[0.25, 3.0, 0.0]], np.float32)[..., None], 3, axis=-1)
-    image = straight_srgb({"radiance": radiance, "alpha": alpha})
-    assert srgb_to_linear(image)[0, :, 0] == pytest.approx([0.5, 1, 0], abs=1e-6)
 
 
 FULL = {

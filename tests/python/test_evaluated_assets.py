@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from splitnerf.data.asset import Asset, Material
+from painted_ball import bare
+from splitnerf.data.asset import Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, write_image
 from splitnerf.data.truth import ViewTruth
@@ -116,25 +117,16 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
     """The demo's true ball: where it is, and by what light; the train views are others."""
     data = data_with_mesh
     mesh = trimesh.load(data / "mesh.ply", process=False)
-    n = len(mesh.vertices)
-    asset = Asset(
-        "ball",
-        np.float32(mesh.vertices),
-        np.int32(mesh.faces),
-        np.float32(mesh.vertex_normals),
-        np.zeros(len(mesh.faces), np.int32),
-        [Material("grey", (0.5, 0.5, 0.5), 0.5)],
-    )
-    assert n > 100
+    assert len(mesh.vertices) > 100
     path = tmp_path / "ball.glb"
-    write_glb(path, asset)
-    bare = evaluate_asset(path, data, Protocol(spp=1, views=1))
+    write_glb(path, bare(mesh, Material("grey", (0.5, 0.5, 0.5), 0.5)))
+    plain = evaluate_asset(path, data, Protocol(spp=1, views=1))
     assert (
-        bare.dataset.split == "test"
-        and len(bare.predictions) == 1
-        and bare.scores["novel_view"] is bare.scores["light_psnr"] is None
+        plain.dataset.split == "test"
+        and len(plain.predictions) == 1
+        and plain.scores["novel_view"] is plain.scores["light_psnr"] is None
     )
-    assert bare.scores["chamfer"] < 0.02 and bare.scores["f_score"] > 0.9
+    assert plain.scores["chamfer"] < 0.02 and plain.scores["f_score"] > 0.9
     light = read_image(data / "light.hdr")
     write_image(tmp_path / "environment.exr", light)
     write_image(tmp_path / "environment.hdr", np.ones_like(light))

@@ -14,7 +14,7 @@ from splitnerf.export import bake, maps
 from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
 from splitnerf.export.maps import encode_maps
 from splitnerf.export.surface import Surface
-from splitnerf.export.textured import textured_asset, vertex_normals
+from splitnerf.export.textured import vertex_normals
 
 
 def square() -> UnwrappedMesh:
@@ -101,28 +101,6 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
     more, field = np.concatenate([vertices, np.float32([[0, 0.9, 0]])]), np.float32([0.3, 0.9, 0]) / 0.9**0.5
     assert vertex_normals(ball(), more, faces)[-1] == pytest.approx(field, abs=1e-5)  # of no face
     assert vertex_normals(ball(sign=0.0), more, faces)[-1].tolist() == [0, 0, 1]
-
-
-def test_normals_are_those_of_the_places_that_vertices_move_to():
-    """Off the surface the gradient leans over, on it it is radial."""
-    surface = ball()
-
-    def leaning(x):
-        f = surface.sdf(x)
-        return f, torch.nn.functional.normalize(x, dim=1) + 5 * f[:, None] * torch.tensor([1.0, 0.0, 0.0])
-
-    mesh = trimesh.creation.icosphere(2, 0.85)
-    found = textured_asset(
-        "ball",
-        np.float32(mesh.vertices),
-        np.int32(mesh.faces),
-        dataclasses.replace(surface, gradient=leaning),
-        n_faces=0,
-        texture_size=64,
-        spacing=0.05,
-        occlusion_offset=0.01,
-    ).asset
-    np.testing.assert_allclose(found.normals, found.vertices / 0.8, atol=2e-3)
 
 
 def textured() -> Asset:

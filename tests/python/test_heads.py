@@ -8,7 +8,7 @@ import pytest
 import torch
 from op_checks import generator, unit
 from splitnerf import _core
-from splitnerf.fields import MaterialHead, NoOcclusion, OcclusionHead, OcclusionQuery, RaySegments
+from splitnerf.fields import MaterialHead, NoOcclusion, OcclusionHead, OcclusionQuery
 from splitnerf.fields.heads import relu_mlp
 
 
@@ -125,15 +125,6 @@ def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_th
     (found.diffuse.sum() + found.specular.sum()).backward()
     assert query.inputs[0].grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
     assert query.positions.grad is query.normals.grad is query.lobe_dirs.grad is query.roughness.grad is None
-
-
-def test_a_kind_of_occlusion_is_told_the_segments_of_the_points():
-    head, segments, told = OcclusionHead(7, 8, 1, 1, directional=True), RaySegments(torch.zeros(1), torch.zeros(40)), []
-    head.use(None)
-    head.answer = lambda query, given: told.append(given)
-    head(query_of(), segments)
-    head(query_of())
-    assert told[0] is segments and told[1] is None
 
 
 def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sphere():

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import pytest
 import torch
 import trimesh
+from op_checks import generator
 from splitnerf.config import Config
 from splitnerf.ops import MeshScene
 from splitnerf.render.model import SceneModel
@@ -25,10 +26,6 @@ ALL = {
     "sphere_radius": 0.6,
     "min_step": 0.05,
 }
-
-
-def generator() -> torch.Generator:
-    return torch.Generator().manual_seed(0)
 
 
 class Scene(SimpleNamespace):
@@ -133,14 +130,6 @@ def test_a_step_goes_on_while_rays_are_traced(hand):
     numbers, _, shapes = hand[2][2][:3]
     m = round(0.25 * len(ray.shaded))
     assert [list(x) for x in shapes] == [[m, 3]] * 3 + [[m, 1], [8, 16, 3]] and len(numbers) == 10 * m + 8 * 16 * 3
-
-
-def test_no_gradient_waits_in_what_is_kept(hand):
-    scene = Scene()
-    late, ray = LateOcclusion(scene.model, generator()), scene.rendered()
-    late.loss(ray, scene.mesh, scene.environment, 0)
-    kept = late._asked
-    assert not any(x.requires_grad for x in (kept.positions, *kept.points, kept.shares, hand[0][2][0]))
 
 
 def test_a_thread_traces_and_what_goes_wrong_there_is_told(monkeypatch):

@@ -7,16 +7,13 @@ from types import SimpleNamespace
 
 import pytest
 import torch
+from op_checks import generator
 from splitnerf.fields.light import LightSamples
 from splitnerf.training import losses
 from test_physics import rays
 from tiny_runs import tiny
 
 LOOSE = {"light_noise": 0.0, "light_lobe_below": 0.0, "constants.light_form": "square"}
-
-
-def generator(seed: int = 0) -> torch.Generator:
-    return torch.Generator().manual_seed(seed)
 
 
 class Slope:
@@ -265,18 +262,3 @@ def test_similar_materials_attract_each_other():
         for slope, sign, x in zip(leaf.grad, (-1, 1), by_width):
             expected = sign * attraction * x / width / math.sqrt(columns)
             assert slope.tolist() == pytest.approx([expected] * columns, rel=0.05), name
-
-
-def test_factors_are_drawn_to_the_traced_ones_and_diffuse_light_to_grey(monkeypatch):
-    """By 2 w (o - traced) over the sum of w; light of one tint by the slope of its chroma."""
-    monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **_: (torch.full((4, 1), 0.5),) * 2)
-    ray = occlusion_rays(4)
-    factors = [x.requires_grad_() for x in (ray.points.occlusion_d, ray.points.occlusion_s)]
-    config = tiny(occlusion_share=1.1, occlusion_channels=1)
-    losses.occlusion_loss(ray, None, None, config, generator(), 0).backward()
-    for factor in factors:
-        expected = 2 * ray.shares * (factor[:, 0].detach() - 0.5) / ray.shares.sum()
-        torch.testing.assert_close(factor.grad[:, 0], expected)
-    tint = torch.tensor([0.5, 0.0, -0.5], requires_grad=True)
-    losses.neutral_light_loss(lambda x, _: tint.exp().expand(len(x), 3), tiny(), generator()).backward()
-    assert tint.grad.tolist() == pytest.approx([2 * 0.5 / 3, 0.0, -2 * 0.5 / 3], abs=1e-4)

@@ -90,24 +90,6 @@ def test_a_light_may_read_other_tensors_and_leaves_its_gradients_there():
     assert use(again).item() == use(ours).item()
 
 
-def test_a_light_without_leaves_stays_what_it_is():
-    """The MLP's gradients reach its parameters by themselves, those of the cells too."""
-    light = light_of("mlp")
-    ours = evaluated(light)
-    assert ours.leaves == () and len(ours.constants) == 2
-    copy = ours.with_tensors([], [x.clone() for x in ours.constants])
-    assert use(copy).item() == use(ours).item()
-    use(copy).backward()
-    ours.backward()
-    assert all(p.grad.abs().sum() > 0 for p in light.parameters())
-
-
-def test_a_light_without_cells_has_none_with_other_tensors_either():
-    light = EvaluatedLight(light_of("pyramid").evaluate())
-    copy = light.with_tensors(light.leaves, light.constants)
-    assert light.constants == () and light.cells is copy.cells is None and len(copy.leaves) == 2
-
-
 @pytest.mark.parametrize("read", ["lookups", "cells", "both"])
 def test_what_gathers_is_handed_on_whatever_was_read(read):
     """The gradient of maps alone, of the cells alone, and of both: after two steps twice that of a light evaluated for one."""

@@ -77,21 +77,6 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
     assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
-def test_colours_are_compared_at_the_exposures_of_their_photos(rendered):
-    """Half of the exposure and twice the light are the same."""
-    config, batch, ray, _ = rendered
-    model, linear = SceneModel(config), dataclasses.replace(ray, linear=True)
-    same = (
-        batch._replace(exposure=0.5 * torch.ones_like(batch.exposure)),
-        dataclasses.replace(linear, mean=2 * ray.mean),
-    )
-    terms = [
-        loss_terms(model, model.evaluate_light(), *case, None, None, generator(2), 0, 0.0)
-        for case in ((batch, linear), same)
-    ]
-    assert weighted(terms[1], "colour") == pytest.approx(weighted(terms[0], "colour"), rel=1e-6)
-
-
 def test_nothing_but_the_papers_terms(rendered):
     """The occlusion's comes with the first mesh."""
     assert set(rendered[3]) == {"colour", "eikonal", "light", "metal"} and rendered[3]["light"].weight == 10.0
@@ -191,22 +176,3 @@ def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
         _, asked, g = every_term(step=step)
         assert asked["light"][-2:] == asked["occlusion"][-2:] == (g, step)
         assert asked["neutral"][-1] is asked["entropy"][-1] is g
-
-
-def test_metals_are_drawn_to_their_sides_and_albedo_is_not(rendered):
-    """Slopes with metallic m, by the weights w: 2 w m; w (1 - 2 m); w (1 - f0 / 0.4) where that is positive."""
-    config, batch, ray, _ = rendered
-    albedo = (0.8 * torch.rand(len(ray.shares), 3, generator=generator(6))).requires_grad_()
-    w, m, f0 = ray.shares / ray.shares.sum(), ray.points.metallic.detach()[:, 0], albedo.detach().amax(1)
-    slopes = {"metal": 2 * w * m, "binary_metal": w * (1 - 2 * m), "dark_metal": w * (1 - f0 / 0.4).clamp(min=0)}
-    fixed = dataclasses.replace(
-        ray, mean=ray.mean.detach(), opacity=ray.opacity.detach(), gradients=ray.gradients.detach()
-    )
-    for name, expected in slopes.items():
-        metallic = ray.points.metallic.detach().clone().requires_grad_()
-        alone = dict.fromkeys(WEIGHTS, 0.0) | {f"{name}_weight": 1.0, "priors_from": 0.0}
-        model = SceneModel(config.replace(alone))
-        leaves = dataclasses.replace(fixed, points=ray.points._replace(metallic=metallic, albedo=albedo))
-        loss_terms(model, model.evaluate_light(), batch, leaves, None, None, generator(2), 0, 0.0).backward()
-        assert albedo.grad is None and expected.abs().max() > 0
-        torch.testing.assert_close(metallic.grad[:, 0], expected, rtol=1e-3, atol=1e-7)

@@ -58,13 +58,6 @@ def test_a_part_that_may_take_long_is_said_at_once(clock, capsys):
     assert capsys.readouterr().err == "  0% 00:00<? first\n"
 
 
-def test_no_time_is_foretold_before_the_first_step(clock, capsys):
-    with Progress(0.2) as bar:
-        clock[0] += 10
-        bar.show(0.2, "begins")
-    assert capsys.readouterr().err == " 20% 00:10<? begins\n"
-
-
 def test_a_line_beside_the_bar_stands_alone_and_the_clock_goes_on(monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr("sys.stderr", terminal)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from splitnerf.data.asset import Asset, Material
+from painted_ball import bare
+from splitnerf.data.asset import Material
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
@@ -131,17 +132,9 @@ def test_shiny_normals_are_weighted():
 
 
 def test_albedo_is_scaled_before_relighting():
-    asset = Asset(
-        "a",
-        np.eye(3, dtype=np.float32),
-        np.array([[0, 1, 2]], np.int32),
-        np.eye(3, dtype=np.float32),
-        np.zeros(1, np.int32),
-        [
-            Material(albedo=(0.2, 0.4, 0.8)),
-            Material(albedo=(0.5, 1, 1), albedo_texture=np.full((2, 2, 3), 0.4, np.float32)),
-        ],
-    )
+    texture = np.full((2, 2, 3), 0.4, np.float32)
+    materials = Material(albedo=(0.2, 0.4, 0.8)), Material(albedo=(0.5, 1, 1), albedo_texture=texture)
+    asset = bare(trimesh.Trimesh(np.eye(3), [[0, 1, 2]]), *materials)
     plain, textured = Delivered(asset, None, np.zeros(3), 1).with_albedo(np.array([2.0, 0.5, 3.0])).asset.materials
     assert plain.albedo == pytest.approx((0.4, 0.2, 1.0))
     assert textured.albedo == (1, 1, 1) and textured.albedo_texture[0, 0] == pytest.approx([0.4, 0.2, 1.0])

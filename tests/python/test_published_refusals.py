@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from splitnerf.data.asset import Asset, Material
+import trimesh
+from painted_ball import bare
+from splitnerf.data.asset import Material
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
@@ -22,9 +24,7 @@ class Painted:
     """An asset whose pictures are given by the test."""
 
     environment = LIGHT
-    asset = Asset(
-        "a", np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]]), np.eye(3, dtype=np.float32), np.zeros(1, np.int32)
-    )
+    asset = bare(trimesh.Trimesh(np.eye(3), [[0, 1, 2]]))
     vertices = 10 * np.eye(3)
 
     def __init__(self, image: np.ndarray):

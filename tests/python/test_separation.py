@@ -353,12 +353,6 @@ class TestFoot:
         foot = find_foot(self.TABLE, points, np.full_like(colours, 0.5), post)
         assert foot.holds(self.over(0.1, 0.0)).all() and not foot.holds(self.over(0.2, 0.0)).any()
 
-    def test_on_a_coarse_map_neighbours_reach_no_farther(self):
-        points, colours, post = self.scene(0.03, 0.004)
-        few = slice(None, None, 16)
-        foot = find_foot(self.TABLE, points[few], np.full_like(colours[few], 0.5), post)
-        assert foot.holds(self.over(0.33, 0.0)).all() and not foot.holds(self.over(0.5, 0.0)).any()
-
     def test_what_no_photo_shows_within_the_foot_is_the_foots(self):
         points, colours, _ = self.scene(0.012, 0.003)
         radius = np.linalg.norm(points @ self.TABLE.axes.T, axis=1)

@@ -9,6 +9,7 @@ from op_checks import generator, unit
 from splitnerf.fields import EvaluatedLight, Light, Occlusion
 from splitnerf.ops import brdf_lut
 from splitnerf.render.model import SceneModel, ShadedPoints
+from test_views import Given
 from tiny_runs import tiny
 
 K = 60  # points
@@ -25,17 +26,6 @@ class TwoLights(Light):
         return self.level[(roughness[:, 0] == 1).long()][:, None].expand(-1, 3)
 
 
-class Given(torch.nn.Module):
-    """Answers the same to everybody."""
-
-    def __init__(self, answer):
-        super().__init__()
-        self.answer = answer
-
-    def forward(self, *inputs):
-        return self.answer
-
-
 def points_of(metallic: float, roughness: float = 0.4) -> tuple:
     g = generator(3)
     albedo = 0.1 + 0.8 * torch.rand(K, 3, generator=g)
@@ -45,9 +35,9 @@ def points_of(metallic: float, roughness: float = 0.4) -> tuple:
 def shade(light: Light, materials: tuple, occlusion: Occlusion | None = None, **settings: object) -> ShadedPoints:
     """Points of these materials, seen from anywhere above, by a model with this light and these factors."""
     model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
-    model.light, model.material = light, Given(materials)
+    model.light, model.material = light, Given(lambda *_: materials)
     if occlusion is not None:
-        model.occlusion = Given(occlusion)
+        model.occlusion = Given(lambda *_: occlusion)
     g = generator(4)
     normals = unit(torch.randn(K, 3, generator=g))
     views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))

@@ -239,20 +239,6 @@ def shape_of_ball(n: int = CELLS) -> StartShape:
     return StartShape(ball(0.8, n=n), torch.ones(n, n, n), BOX)
 
 
-def test_a_shape_is_read_where_it_is():
-    middle = (0.3, -0.2, 0.1)
-    places = torch.tensor(middle) + torch.tensor([[0.8, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.5]])
-    shape = StartShape(ball(0.8, middle), shape_of_ball().trust, BOX)
-    assert torch.allclose(shape.at(places), torch.tensor([0.0, 0.2, -0.3]), atol=0.01)
-
-
-def test_points_are_drawn_on_both_sides_of_the_surface():
-    shape = shape_of_ball()
-    distance = shape.drawn(4000, torch.Generator().manual_seed(1)).norm(dim=1) - 0.8
-    assert distance.abs().max() < 5 * shape.cell
-    assert 0.3 < (distance < 0).float().mean() < 0.7
-
-
 def test_a_field_is_held_where_the_photos_are_sure_and_within_half_a_cell():
     shape = shape_of_ball()
     points = torch.tensor([[0.9, 0.0, 0.0], [-0.9, 0.0, 0.0]])

@@ -15,6 +15,7 @@ from splitnerf.fields import Light
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import light_queries, monte_carlo_light, prefilter_light, shade_sums, split_sum_shade
 from splitnerf.render.model import SceneModel, ShadedPoints
+from test_views import Given
 
 
 class Lamp(Light):
@@ -86,23 +87,13 @@ def test_the_furnace_of_the_whole_model(metallic):
     n = unit(torch.randn(k, 3, generator=g))
     views = unit(n + 0.9 * unit(torch.randn(k, 3, generator=g)))
     rough = 0.05 + 0.95 * torch.rand(k, 1, generator=g)
-    model.material = Given((torch.ones(k, 3), rough, torch.full((k, 1), metallic)))
+    white = torch.ones(k, 3), rough, torch.full((k, 1), metallic)
+    model.material = Given(lambda *_: white)
     points = model.shade(lit, 0.5 * n, torch.zeros(k, 13), torch.zeros(k, 4), n, views)
     summed = points.radiance.index_add(0, *model.quadrature_correction(lit, views, points, torch.arange(k)))
     torch.testing.assert_close(points.radiance, torch.ones(k, 3), rtol=0, atol=0.01)
     assert summed[rough[:, 0] > 0.45].mean().item() == pytest.approx(1.0, abs=0.002)
     assert (summed - 1).abs().max() < 0.05
-
-
-class Given(torch.nn.Module):
-    """Materials that do not depend on where."""
-
-    def __init__(self, materials):
-        super().__init__()
-        self.materials = materials
-
-    def forward(self, *inputs):
-        return self.materials
 
 
 def prefiltered(lamp, directions, roughness) -> torch.Tensor:

@@ -9,7 +9,7 @@ import torch
 from op_checks import generator, unit
 from splitnerf.config import preset
 from splitnerf.fields import EvaluatedLight, Occlusion, RaySegments
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
+from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step
@@ -216,54 +216,34 @@ def test_a_model_begins_as_it_is_set():
     assert SceneModel(tiny(table_dtype="float16")).sdf_field.grid.stored().dtype == torch.float16
 
 
+def matrices(net: torch.nn.Module) -> list[tuple[int, ...]]:
+    """The shapes of a network's matrices."""
+    return [tuple(p.shape) for p in net.parameters() if p.dim() == 2]
+
+
 def test_parts_are_as_large_as_they_are_set():
-    settings = {
-        "n_levels": 3,
-        "base_resolution": 5,
-        "growth": 1.7,
-        "log2_table_size": 9,
-        "surface_width": 24,
-        "box": 1.3,
+    field = {"n_levels": 3, "base_resolution": 5, "growth": 1.7, "log2_table_size": 9, "surface_width": 24, "box": 1.3}
+    light = {"kind": "mlp", "width": 12, "layers": 4, "activation": "exp"}
+    settings = field | {f"light_{key}": value for key, value in light.items()}
+    settings |= {
         "materials_width": 20,
-        "light.kind": "mlp",
-        "light_width": 12,
-        "light_layers": 4,
         "direction_frequencies": 5,
         "roughness_frequencies": 2,
-        "light_activation": "exp",
-        "occlusion.kind": "mlp",
-        "occlusion_width": 18,
-        "occlusion.channels": 3,
-        "directional": False,
+        "shading.method": "split",
     }
+    settings |= {"occlusion.kind": "mlp", "occlusion_width": 18, "occlusion.channels": 3, "directional": False}
     for inputs, n_inputs in (("outputs", 13), ("grid", 13 + 3 + 6)):
-        model = SceneModel(tiny(**{"shading.method": "split"}).replace(settings | {"materials.inputs": inputs}))
-        spec = model.sdf_field.grid.spec
-        assert (spec.n_levels, spec.n_features, spec.base_resolution, spec.growth, spec.log2_table_size) == (
-            3,
-            2,
-            5,
-            1.7,
-            9,
-        )
+        model = SceneModel(tiny(**settings | {"materials.inputs": inputs}))
+        assert model.sdf_field.grid.spec == HashGridSpec(3, 2, 5, 1.7, 9) and model.sdf_field.box == 1.3
         assert model.sdf_field.hidden_direction.shape == (24, 9) and model.sdf_field.out_direction.shape == (13, 24)
-        assert model.sdf_field.box == 1.3
-        assert [tuple(p.shape) for p in model.material.net.parameters() if p.dim() == 2] == [
-            (20, n_inputs),
-            (20, 20),
-            (5, 20),
-        ]
-        assert [tuple(p.shape) for p in model.light.hidden.parameters() if p.dim() == 2] == [(12, 34)] + [(12, 12)] * 3
+        assert matrices(model.material.net) == [(20, n_inputs), (20, 20), (5, 20)]
+        assert matrices(model.light.hidden) == [(12, 34)] + [(12, 12)] * 3
         assert len(model.light.roughness_scales) == 2 and model.light.activation == "exp"
-        assert [tuple(p.shape) for p in model.occlusion.net.parameters() if p.dim() == 2] == [
-            (18, n_inputs),
-            (18, 18),
-            (6, 18),
-        ]
+        assert matrices(model.occlusion.net) == [(18, n_inputs), (18, 18), (6, 18)]
         assert not model.occlusion.directional and model.variance.requires_grad
     assert SceneModel(tiny(light_resolution=32)).light.resolution == 32
     nothing = SceneModel(
-        tiny(**{"shading.method": "split"}).replace({"occlusion.kind": "off", "occlusion.channels": 3})
+        tiny(**{"shading.method": "split", "occlusion.kind": "off", "occlusion.channels": 3})
     ).occlusion
     assert nothing.n_channels == 3 and not nothing.needs_mesh
 

@@ -12,9 +12,7 @@ from mesh_shapes import OFFSET, cache_of, corners, grid_mesh, lattice, scene_of
 from op_cases import cached_occlusion_inputs
 from op_checks import lib
 from splitnerf import _core
-from splitnerf.config import Config
 from splitnerf.ops import VisibilityCache, cached_occlusion, visibility_bits
-from splitnerf.render.model import SceneModel
 
 UP = torch.tensor([[0.0, 0.0, 1.0]])
 
@@ -86,24 +84,6 @@ def test_the_furnace_of_a_bowl(albedo):
     torch.testing.assert_close(i_s, i_d, rtol=1e-4, atol=1e-5)  # roughness 1 about the normal
     if albedo == 1.0:  # all that arrives, from sky or bowl, is 1
         torch.testing.assert_close((o_d + i_d)[inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.04)
-
-
-def test_each_refresh_of_a_model_adds_a_bounce():
-    """In a bowl; the sums converge, and none of it is a parameter."""
-    settings = {"n_levels": 2, "log2_table_size": 8, "occlusion_directions": 64, "initial_roughness": 0.9}
-    torch.manual_seed(0)
-    model = SceneModel(Config().replace(settings | {"shading.method": "split"}))
-    mesh = half_shell(3)
-    vertices, faces = torch.tensor(np.asarray(mesh.vertices)).float(), torch.tensor(np.asarray(mesh.faces))
-    model.use_mesh(model.occlusion.trace(scene_of(mesh), vertices, faces))
-    bits, levels = model.occlusion, []
-    assert not any(key.startswith("occlusion") for key in model.state_dict())
-    bits.radiance = None
-    for _ in range(6):
-        model.refresh_indirect(model.evaluate_light())
-        levels.append(bits.radiance.mean().item())
-    steps = np.diff(levels)
-    assert (steps > 0).all() and (steps[1:] < 0.6 * steps[:-1]).all() and steps[0] > 0.05 * levels[0]
 
 
 def test_a_point_that_is_none_has_no_factors():

@@ -320,14 +320,6 @@ def test_a_segment_has_the_factors_of_its_leader():
         assert torch.equal(found, expected[leaders[segment]]) and not torch.equal(found, expected)
 
 
-def test_no_gradient_flows_through_the_factors():
-    mesh = dented()
-    bits, q = bits_on(mesh), queries(mesh)
-    bits.light.requires_grad_()
-    found = bits(OcclusionQuery(*(part.clone().requires_grad_() for part in q)))
-    assert not found.diffuse.requires_grad and not found.specular.requires_grad
-
-
 def test_lobes_are_summed_where_15_directions_are_within_them():
     """A lobe of roughness r holds 3 k r^4 of k directions."""
     for k in (64, 256, 1024):
