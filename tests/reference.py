@@ -268,50 +268,6 @@ def monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance) 
     return weights @ (radiance * share[..., None])
 
 
-def drawn_directions(
-    normals: Tensor, view_dirs: Tensor, roughness: Tensor, share: float, n_samples: int, seed: int = 0
-) -> tuple[Tensor, Tensor]:
-    """Directions [n, k, 3] and their densities [n, k]: a share by the visible normals, then the rest by the cosine.
-
-    Either part is a lattice with a random shift for each point; the density is that of both parts together.
-
-    Source: Heitz 2018; Dupuy and Benyoub 2023 (visible normals); Veach 1997 (balance heuristic).
-    """
-    generator, golden = torch.Generator().manual_seed(seed), (5**0.5 - 1) / 2
-    normals, _ = facing(normals, view_dirs)
-    tangent = F.normalize(
-        torch.linalg.cross(normals, normals.roll(1, 1) * torch.tensor([1.0, -1.0, 1.0]).to(normals)), dim=1
-    )
-    frame = torch.stack([tangent, torch.linalg.cross(normals, tangent), normals], 2)  # its columns are the axes
-    view, alpha = (view_dirs[:, None] @ frame), (roughness**2).clamp(min=2e-3)[..., None]
-
-    def lattice(count: int) -> tuple[Tensor, Tensor]:
-        steps = torch.arange(count, dtype=normals.dtype)
-        first, second = torch.rand(2, len(normals), 1, generator=generator, dtype=normals.dtype)
-        return torch.frac((steps + 0.5) / max(count, 1) + first), 2 * math.pi * (steps * golden + second)
-
-    def around(height: Tensor, angle: Tensor) -> Tensor:
-        radius = (1 - height**2).clamp(min=0).sqrt()
-        return torch.stack([radius * angle.cos(), radius * angle.sin(), height], -1)
-
-    count = round(share * n_samples)
-    u, angle = lattice(count)
-    stretched = F.normalize(torch.cat([alpha * view[..., :2], view[..., 2:]], -1), dim=-1)
-    cap = around((1 - u) * (1 + stretched[..., 2]) - stretched[..., 2], angle) + stretched
-    half = F.normalize(torch.cat([alpha * cap[..., :2], cap[..., 2:].clamp(min=0)], -1), dim=-1)
-    mirrored = 2 * (view * half).sum(-1, keepdim=True) * half - view
-    u, angle = lattice(n_samples - count)
-    local = torch.cat([mirrored, around(u.sqrt(), angle)], 1)
-
-    a2, n_v = alpha[..., 0] ** 2, view[..., 2].clamp(min=1e-4)
-    apart = F.normalize(local + view, dim=-1) - torch.tensor([0.0, 0.0, 1.0]).to(local)
-    apart = apart.square().sum(-1)
-    d = a2 / (math.pi * (a2 + (1 - a2) * apart * (1 - apart / 4)) ** 2)
-    visible = d / (2 * (n_v + (a2 + (1 - a2) * n_v**2).sqrt()))
-    density = count / n_samples * visible + (1 - count / n_samples) * local[..., 2] / math.pi
-    return local @ frame.transpose(1, 2), torch.where(local[..., 2] > 0, density, 0)
-
-
 def summed_light(normals, view_dirs, roughness, directions, solid_angles, radiance, visible, sent) -> Tensor:
     """The sums of :func:`monte_carlo_light` over shared directions, whose densities follow from their solid angles."""
     n, k = visible.shape
@@ -501,11 +457,16 @@ def pixel_losses(mean, opacity, target, background, whole, exposure, linear: boo
 
 
 def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> tuple[Tensor, Tensor]:
-    """(|g| - 1)^2, and the distance of unit normals of neighbours that face the same way."""
-    eikonal = (torch.sqrt(gradients.square().sum(-1) + 1e-24) - 1).square().mean()
+    """(|g| - 1)^2, and the distance of unit normals of neighbours that face the same way; shorter ones than 1e-3 have no
+    direction."""
+    squared = gradients.square().sum(-1)
+    eikonal = (torch.sqrt(squared + 1e-24) - 1).square().mean()
+    has_direction = squared >= 1e-6
     here, there = (F.normalize(g, dim=1) for g in (gradients[beside], gradients[len(gradients) - len(beside) :]))
     apart = (there - here).square().sum(1)
-    counts = weights[beside] * (apart.detach() < 2)
+    counts = (
+        weights[beside] * (apart.detach() < 2) * has_direction[beside] * has_direction[len(gradients) - len(beside) :]
+    )
     return eikonal, (counts * torch.sqrt(apart + 1e-24)).sum() / counts.sum().clamp(min=1e-8)
 
 

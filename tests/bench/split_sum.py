@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-from reference import drawn_directions
 from scipy import ndimage
 from splitnerf import _core
 from splitnerf.ops import (
@@ -22,6 +21,7 @@ from splitnerf_tools.bench.charts import Chart, Point, Result
 from splitnerf_tools.bench.harness import rms
 from splitnerf_tools.bench.prefilter import Truth
 from splitnerf_tools.bench.subjects import MapLight, lights
+from stability.cases import drawn_directions
 from torch import Tensor
 from torch.nn import functional as F
 

@@ -120,23 +120,6 @@ TEST(March, RaysThatMissGiveNothing) {
   EXPECT_TRUE(march(grid, {0, 0, 0}, {1, NAN, 0}).empty());
 }
 
-TEST(March, StartsAtACameraInsideTheBox) {
-  const Grid grid(4, 0.01, uint8_t(Cell::kOccupied));
-  const std::vector<double> starts = march(grid, {0, 0, 0}, {0, 0, 1}, 0.25);
-  EXPECT_NEAR(double(starts.size()), 150, 1);
-  EXPECT_GT(starts.front() + 0.005, 0);
-  EXPECT_LT(starts.front(), 0.01);
-}
-
-TEST(March, AnOpaqueCellEndsTheRay) {
-  Grid grid(10, 0.01, uint8_t(Cell::kOccupied));
-  for (int y = 0; y < 10; ++y)
-    for (int z = 0; z < 10; ++z) grid.at(5, y, z) = uint8_t(Cell::kOpaque);
-  const std::vector<double> starts = march(grid, {-3, 0.1, 0.1}, {1, 0, 0});
-  EXPECT_NEAR(double(starts.size()), 150, 1);
-  EXPECT_LE(-3 + starts.back() + 0.005, 1e-6);
-}
-
 TEST(March, KeepsTheFirstMaxSamples) {
   Grid grid(10, 0.01, uint8_t(Cell::kOccupied));
   const std::vector<double> all = march(grid, {-3, 0.1, 0.1}, {1, 0, 0});
@@ -144,39 +127,6 @@ TEST(March, KeepsTheFirstMaxSamples) {
     grid.options.max_samples = limit;
     const std::vector<double> starts = march(grid, {-3, 0.1, 0.1}, {1, 0, 0});
     EXPECT_EQ(starts, std::vector<double>(all.begin(), all.begin() + limit));
-  }
-}
-
-TEST(March, JitterShiftsTheLattice) {
-  const Grid grid(4, 0.1, uint8_t(Cell::kOccupied));
-  const std::vector<double> a = march(grid, {-3, 0, 0}, {1, 0, 0}, 0.6), b = march(grid, {-3, 0, 0}, {1, 0, 0}, 0.9);
-  EXPECT_NEAR(b.front() - a.front(), 0.03, 1e-6);
-}
-
-TEST(March, PacksTheRaysOneAfterTheOther) {
-  const Grid grid(4, 0.05, uint8_t(Cell::kOccupied));
-  Random random(2);
-  const int64_t n_rays = 300;
-  std::vector<float> o, d = random.directions<float>(size_t(n_rays)), jitter = random.uniforms<float>(size_t(n_rays));
-  for (int64_t r = 0; r < n_rays; ++r)
-    for (int c = 0; c < 3; ++c) o.push_back(r % 3 ? -2 * d[3 * r + c] : 4.f);  // every third ray misses, most likely
-  std::vector<int64_t> offsets(n_rays + 1);
-  const OccupancyCells cells(grid.cells.data(), grid.resolution);
-  cpu::run(n_rays, MarchCountBody<float>{grid.options, cells.view(), o.data(), d.data(), jitter.data(), &offsets[1]});
-  for (int64_t r = 0; r < n_rays; ++r) offsets[r + 1] += offsets[r];
-  const size_t n = size_t(offsets.back());
-  std::vector<int64_t> rays(n, -1);
-  std::vector<float> t_starts(n), t_ends(n);
-  cpu::run(n_rays, MarchFillBody<float>{grid.options, cells.view(), o.data(), d.data(), jitter.data(), offsets.data(),
-                                        rays.data(), t_starts.data(), t_ends.data()});
-  EXPECT_EQ(offsets[0], 0);
-  ASSERT_GT(n, 1000u);
-  for (int64_t r = 0; r < n_rays; ++r) {
-    for (int64_t i = offsets[r]; i < offsets[r + 1]; ++i) {
-      EXPECT_EQ(rays[i], r);
-      EXPECT_NEAR(t_ends[i] - t_starts[i], 0.05, 1e-6);
-      if (i > offsets[r]) { EXPECT_NEAR(t_starts[i] - t_starts[i - 1], 0.05, 1e-5); }
-    }
   }
 }
 

@@ -81,20 +81,6 @@ TEST(MarchingCubesTable, NeighboursAgreeOnTheirCommonFace) {
   }
 }
 
-TEST(MarchingCubesTable, OneCornerFacesAwayFromIt) {
-  for (int corner = 0; corner < 8; ++corner) {
-    const CubeCase& cell = cube_cases()[1 << corner];
-    ASSERT_EQ(cell.n_triangles, 1);
-    Vec3<double> p[3];
-    for (int k = 0; k < 3; ++k) {
-      const CubeEdge& edge = cube_edges()[cell.edges[k]];
-      for (int axis = 0; axis < 3; ++axis) p[k][axis] = 0.5 * ((edge.from >> axis & 1) + (edge.to >> axis & 1));
-    }
-    const Vec3<double> at{double(corner & 1), double(corner >> 1 & 1), double(corner >> 2)};
-    EXPECT_GT(dot(cross(p[1] - p[0], p[2] - p[0]), p[0] - at), 0) << "corner " << corner;
-  }
-}
-
 // Blocks with random or given values inside a shell of outside blocks.
 struct Field {
   int n_blocks;
@@ -147,24 +133,6 @@ TEST(MarchingCubes, RandomFieldsAreClosedAndOriented) {
     ASSERT_GT(mesh.triangles.size(), 1000u);
     EXPECT_GT(expect_closed(mesh), 0);
   }
-}
-
-TEST(MarchingCubes, OpensWhatTheSurfaceEntersAndNoMore) {
-  // A ball of radius 7.3 about node (12, 12, 12), met in one block only.
-  const auto ball = [](int i, int j, int k) { return length(Vec3<double>{i - 12., j - 12., k - 12.}) - 7.3; };
-  Field sparse(4), dense(4);
-  for (int x = 0; x < 6; ++x)
-    for (int y = 0; y < 6; ++y)
-      for (int z = 0; z < 6; ++z) dense.open(x, y, z, ball);
-  sparse.open(4, 3, 3, ball);
-  for (std::vector<int64_t> more; !(more = blocks_to_open(sparse.grid())).empty();)
-    for (int64_t i : more) sparse.open(int(i / 36), int(i / 6 % 6), int(i % 6), ball);
-  EXPECT_LT(sparse.values.size(), dense.values.size());
-  const TriangleMesh a = marching_cubes(sparse.grid(), -1.5, 0.1), b = marching_cubes(dense.grid(), -1.5, 0.1);
-  EXPECT_EQ(a.triangles.size(), b.triangles.size());
-  EXPECT_EQ(a.vertices.size(), b.vertices.size());
-  EXPECT_NEAR(expect_closed(a), 4. / 3 * kPi * std::pow(0.73, 3), 0.02);
-  EXPECT_NEAR(expect_closed(b), expect_closed(a), 1e-6);
 }
 
 TEST(MarchingCubes, TwoSkippedBlocksOfOtherSignAreOpened) {

@@ -109,17 +109,6 @@ TEST(Neus, FaintRaysKeepTheirDigits) {
   EXPECT_NEAR(ray.opacity / expected, 1, 1e-5);
 }
 
-TEST(Neus, SamplesBehindTheMinimalTransmittanceAreZero) {
-  const Ray<double> full = falling_ray(0.1, 0.5, 200, 100.), cut = falling_ray(0.1, 0.5, 200, 100., 1e-3);
-  int dropped = 0;
-  for (int i = 0; i < 200; ++i) {
-    EXPECT_TRUE(cut.weights[i] == full.weights[i] || cut.weights[i] == 0);
-    dropped += cut.weights[i] != full.weights[i];
-  }
-  EXPECT_GT(dropped, 50);
-  EXPECT_NEAR(cut.opacity, full.opacity, 1e-3);
-}
-
 TEST(Neus, NanReachesTheCaller) {
   Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
   ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
@@ -130,59 +119,6 @@ TEST(Neus, NanReachesTheCaller) {
 }
 
 // ---- adjoints ----
-
-struct Batch {
-  std::vector<int64_t> offsets{0};
-  std::vector<double> x;  // f_prev, f_next, s
-  int64_t n = 0;
-
-  // Calls body(ray, its first sample, their number, their ends) for each ray.
-  template <class Body> void each(const Body& body) const {
-    for (size_t r = 0; r + 1 < offsets.size(); ++r)
-      body(r, offsets[r], offsets[r + 1] - offsets[r], NeusEnds<double>{&x[offsets[r]], &x[n + offsets[r]]});
-  }
-};
-
-// Rays that cross the surface, with a sample in each that rises; one ray is empty.
-Batch crossing_rays(Random& random, double s) {
-  Batch batch;
-  for (const int length : {12, 0, 1, 20}) batch.offsets.push_back(batch.offsets.back() + length);
-  batch.n = batch.offsets.back();
-  batch.x = random.uniforms(size_t(2 * batch.n + 1));
-  for (int64_t i = 0; i < batch.n; ++i) {
-    batch.x[i] = 2 / s * (1 - 0.2 * double(i % 12) + 0.2 * batch.x[i]);
-    batch.x[batch.n + i] = batch.x[i] - (i % 5 == 4 ? -0.2 : 0.6) / s * (0.2 + batch.x[batch.n + i]);
-  }
-  batch.x.back() = s;
-  return batch;
-}
-
-TEST(Neus, AdjointFollowsCentralDifferences) {
-  Random random(1);
-  for (const double s : {3., 20.}) {
-    for (const double min_transmittance : {0., 0.05}) {
-      Batch b = crossing_rays(random, s);
-      const std::vector<double> gw = random.uniforms(size_t(b.n), -1), ga = random.uniforms(4, -1);
-      std::vector<double> weights(b.n), opacity(4), gradient(b.x.size()), depths(b.n);
-      const auto f = [&] {
-        b.each([&](size_t r, int64_t first, int64_t length, const NeusEnds<double>& ends) {
-          opacity[r] =
-              neus_ray_weights(OneThread{}, ends, b.x.back(), length, min_transmittance, weights.data() + first);
-        });
-        return inner(gw, weights) + inner(ga, opacity);
-      };
-      f();
-      b.each([&](size_t r, int64_t first, int64_t length, const NeusEnds<double>& ends) {
-        gradient.back() += neus_ray_weights_backward(
-            OneThread{}, ends, b.x.back(), length, min_transmittance, weights.data() + first, gw.data() + first, ga[r],
-            depths.data() + first, [&](int64_t i, const OpticalDepthGrad<double>& g) {
-              gradient[first + i] = g.f_prev, gradient[b.n + first + i] = g.f_next;
-            });
-      });
-      expect_gradient(f, b.x, gradient, 1e-6, "neus", 1e-6);
-    }
-  }
-}
 
 // Behind a sample of great depth the transmittance of those before it must not lose its digits.
 TEST(Neus, FloatAdjointFollowsDoubleAlongOpaqueRays) {
@@ -218,28 +154,6 @@ TEST(AnnealedCosine, GoesFromSoftToSharp) {
     const double h = 1e-6, slope = (annealed_cosine(c + h, 0.3).value - annealed_cosine(c - h, 0.3).value) / (2 * h);
     EXPECT_NEAR(annealed_cosine(c, 0.3).slope, slope, 1e-9) << c;
   }
-}
-
-TEST(Composite, SumsEachRayAndItsAdjointIsExact) {
-  const std::vector<int64_t> offsets{0, 2, 2, 3};
-  std::vector<double> w{1, 2, 3}, v{1, 10, 2, 20, 3, 30}, sums(6, -7), opacity{2, 0, 0.25};
-  const PackedRays rays{3, offsets.back(), offsets.data()};
-  const CompositeArrays<double> plain{rays, 2, w.data(), v.data(), nullptr, 1};
-  cpu::run(3, CompositeBody<double>{plain, sums.data()});
-  EXPECT_EQ(sums, (std::vector<double>{5, 50, 0, 0, 9, 90}));
-  const std::vector<double> g{1, 2, 3, 4, 5, 6};
-  std::vector<double> gw(3), gv(6), go(3, -7);
-  cpu::run(3, CompositeBackwardBody<double>{plain, g.data(), gw.data(), gv.data(), nullptr});
-  EXPECT_EQ(gw, (std::vector<double>{21, 42, 195}));
-  EXPECT_EQ(gv, (std::vector<double>{1, 2, 2, 4, 15, 18}));
-  // Divided by the opacity, at least 0.5: the second and the third ray count as that, and have no gradient.
-  const CompositeArrays<double> divided{rays, 2, w.data(), v.data(), opacity.data(), 0.5};
-  cpu::run(3, CompositeBody<double>{divided, sums.data()});
-  EXPECT_EQ(sums, (std::vector<double>{2.5, 25, 0, 0, 18, 180}));
-  cpu::run(3, CompositeBackwardBody<double>{divided, g.data(), gw.data(), gv.data(), go.data()});
-  EXPECT_EQ(gw, (std::vector<double>{10.5, 21, 390}));
-  EXPECT_EQ(gv, (std::vector<double>{0.5, 1, 1, 2, 30, 36}));
-  EXPECT_EQ(go, (std::vector<double>{-(2.5 + 2 * 25) / 2, 0, 0}));
 }
 
 }  // namespace

@@ -193,21 +193,6 @@ TEST_F(Occlusion, TheSurfaceItselfIsNoOccluder) {
   EXPECT_EQ(o.s[0], 1);
 }
 
-TEST_F(Occlusion, TheSeedDecidesTheRays) {
-  const Scene scene = make_scene(lifted_sphere(2));
-  const auto with_seed = [&](uint32_t seed) {
-    return factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {48, 48, 0.0125f, seed}).d[0];
-  };
-  EXPECT_EQ(with_seed(1), with_seed(1));
-  double mean = 0;
-  int different = 0;
-  for (uint32_t seed = 0; seed < 200; ++seed)
-    mean += with_seed(seed) / 200, different += with_seed(seed) != with_seed(1);
-  EXPECT_GT(different, 50);
-  EXPECT_NEAR(mean, factors(scene, {0.9, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1), {1 << 16, 1, 0.0125f, 0}).d[0],
-              3e-3);
-}
-
 TEST_F(Occlusion, NoRayAboveTheHorizonLeavesThePointOpen) {
   const Scene scene = make_scene(lifted_sphere(2));
   EXPECT_EQ(factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, -1}, 0.05, constant(1)).s[0], 1);

@@ -256,19 +256,5 @@ TEST(Sampling, WrapStaysBelowOne) {
   EXPECT_LT(wrap_unit(0.5f, std::nextafter(0.5f, 0.f)), 1.f);
 }
 
-TEST(Sampling, FibonacciSphereIsBalanced) {
-  constexpr uint32_t kPoints = 8192;
-  Vec mean{0, 0, 0};
-  double second = 0;
-  for (uint32_t i = 0; i < kPoints; ++i) {
-    const Vec w = fibonacci_sphere<double>(i, kPoints);
-    mean += w / double(kPoints);
-    second += w.x * w.x / kPoints;
-  }
-  EXPECT_LT(length(mean), 1e-3);
-  EXPECT_NEAR(second, 1. / 3, 1e-4);
-  EXPECT_NEAR(length(fibonacci_sphere<float>(0, 1)), 1.f, 1e-6f);
-}
-
 }  // namespace
 }  // namespace splitnerf

@@ -125,16 +125,6 @@ TEST(TexturedPath, TexelsMeetTheirPixels) {
   }
 }
 
-TEST(TexturedPath, EachTriangleHasItsOwnMaterial) {
-  SquareJob job;
-  job.materials.resize(2);
-  job.materials[1].albedo = {0.2f, 0.4f, 0.6f};
-  job.ids = {0, 1};  // triangle 1 covers the upper left half
-  const Image image = job.render();
-  EXPECT_NEAR(image.albedo[(0 * 4 + 0) * 3 + 2], 0.6f, 1e-6f);
-  EXPECT_NEAR(image.albedo[(3 * 4 + 3) * 3 + 2], 1, 1e-6f);
-}
-
 TEST(TexturedPath, NormalMapTurnsTheReflectionAndOnlyTheShadingNormal) {
   // A mirror tilted by the map about each tangent axis shows the map's pole direction: the light
   // equals d.x + 2 (positive), so a smooth metal returns the x of the reflected direction.

@@ -31,17 +31,6 @@ struct Cloud {
   }
 };
 
-TEST(VertexGrids, EachLevelHoldsEveryVertexOnce) {
-  const Cloud cloud(1);
-  for (int level = 0; level < kLevels; ++level) {
-    std::vector<int32_t> found(cloud.order.begin() + level * kVertices, cloud.order.begin() + (level + 1) * kVertices);
-    std::sort(found.begin(), found.end());
-    for (int v = 0; v < kVertices; ++v) ASSERT_EQ(found[v], v);
-    EXPECT_EQ(cloud.starts[level * (kBuckets + 1)], 0);
-    EXPECT_EQ(cloud.starts[(level + 1) * (kBuckets + 1) - 1], kVertices);
-  }
-}
-
 TEST(VertexGrids, NeighboursAreThoseOfBruteForce) {
   const Cloud cloud(2);
   Random random(3);
@@ -78,22 +67,6 @@ TEST(VertexGrids, AFarPointHasNoNeighbours) {
   const Cloud cloud(4);
   for (const double far : {1e3, 1e12, 1e30})
     EXPECT_EQ(find_neighbours(cloud.grids, {far, -far, 0.0}, {0.0, 0.0, 1.0}).n, 0);
-}
-
-TEST(NeighbourWeight, FallsWithDistanceAndNeverTakesTheOtherSide) {
-  EXPECT_GT(neighbour_weight(0.0, 1.0), 100 * neighbour_weight(0.6, 1.0));
-  EXPECT_GT(neighbour_weight(0.5, 1.0), neighbour_weight(0.6, 1.0));
-  EXPECT_GT(neighbour_weight(0.5, 1.0), neighbour_weight(0.5, 0.9));
-  for (const double cosine : {0.0, -1e-9, -1.0}) EXPECT_EQ(neighbour_weight(0.1, cosine), 0);
-  EXPECT_EQ(neighbour_weight(1.0, 1.0), 0);
-}
-
-TEST(CachedLobe, NoLobeIsNarrowerThanTheDirectionsAllow) {
-  for (const int n : {64, 256, 1024}) {
-    const double floor = cached_lobe_alpha(0.0, n);
-    EXPECT_NEAR(3 * n * floor * floor, kLobeDirections, 1e-12);
-    EXPECT_EQ(cached_lobe_alpha(0.9, n), 0.9 * 0.9);
-  }
 }
 
 // Every instruction set against plain loops over the same formulas.

@@ -27,6 +27,10 @@ def devices(op: str) -> list:
 DEVICES = devices("hash_encode")
 
 
+def arguments_of(name: str) -> list[str]:
+    return [argument.name for argument in getattr(lib, name).default._schema.arguments]
+
+
 def generator(seed: int = 0) -> torch.Generator:
     return torch.Generator().manual_seed(seed)
 
@@ -63,15 +67,6 @@ def as_tuple(x) -> tuple:
 
 def floats(outputs) -> list[torch.Tensor]:
     return [x for x in as_tuple(outputs) if x.is_floating_point()]
-
-
-def check_no_gradient(op, inputs: tuple, index: int) -> None:
-    """A gradient to this input raises; it is never zeros and never silently absent."""
-    leaves = grad_leaves(inputs, [index])
-    outputs = floats(op(*leaves))
-    with pytest.raises(RuntimeError, match="gradient|does not require grad"):
-        sum(x.sum() for x in outputs).backward()
-    assert leaves[index].grad is None
 
 
 def check_error(call, *parts: str) -> None:

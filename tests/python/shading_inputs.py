@@ -1,4 +1,4 @@
-"""Inputs of the operators that shade: split sum, sums over light and corrections of rays."""
+"""Inputs of the operators that shade: split sum and sums over light."""
 
 from __future__ import annotations
 
@@ -65,15 +65,3 @@ def indirect_inputs(dtype, mode: int = 0, channels: int = 3, n: int = 300, stack
     light = (torch.cat([specular, diffuse]), None) if stacked else (specular, diffuse)
     indirect = (rand(n, 3, seed=seed, dtype=dtype) for seed in (11, 12))
     return *points, *light, *rest, *indirect
-
-
-# ---- corrections of rays ----
-
-
-def shaded_rays(dtype=torch.float64) -> tuple:
-    """Shaded samples, the rays of all samples, the segments and weights of the shaded ones, and the rays' opacity: three rays of
-    100 samples with every second one shaded in segments of 1 to 5, and a ray without samples."""
-    shaded, ray_indices = torch.arange(0, 300, 2), torch.arange(300) // 100
-    lengths = torch.tensor([1, 2, 5, 3, 4]).repeat(10)
-    segment = torch.repeat_interleave(torch.arange(50), lengths)
-    return shaded, ray_indices, segment, rand(150, seed=1, dtype=dtype), rand(4, seed=2, dtype=dtype)

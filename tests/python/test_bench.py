@@ -14,8 +14,7 @@ import torch
 from bench import operators, shading, split_sum, tables
 from splitnerf.cli import DONE, main
 from splitnerf.errors import CheckFailed
-from splitnerf.fields import SdfField
-from splitnerf_tools.bench import harness, normals, path_tracer, provenance
+from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
 from splitnerf_tools.bench.harness import interleaved
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
@@ -160,26 +159,12 @@ class TestLights:
             assert lobe_integral(torch.tensor([[rho]])).item() == pytest.approx(expected, rel=1e-3)
 
 
-def test_pages_and_pictures_are_written(tmp_path, monkeypatch, capsys):
-    """By the command, and by the program of what only pages need. The analytic gradient is the field's own; one cell's differences
-    are smoother than what was fitted."""
+def test_a_page_with_its_picture_and_points_is_written(tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
-    monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
-    assert main(["bench", "normals", "--quick", "--out", str(tmp_path / "out")]) == DONE
-    monkeypatch.setattr(sys, "argv", ["operators.py", "shading", "--quick", "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(sys, "argv", ["operators.py", "shading", "--quick", "--out", str(tmp_path)])
     operators.main()
-    names = {f"{name}.{end}" for name in ("normals", "shading") for end in ("md", "csv", "png")}
-    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    assert {path.name for path in tmp_path.iterdir()} == {"shading.md", "shading.csv", "shading.png"}
     assert "as fast as torch eager" in capsys.readouterr().out
-    lines = (tmp_path / "out" / "normals.csv").read_text().splitlines()
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    assert {row["series"] for row in rows if row["default"] == "1"} == {"analytic"}
-    errors = {
-        row["variant"]: float(row["error"])
-        for row in rows
-        if row["chart"].endswith("angle to the field's gradient in float64")
-    }
-    assert errors[""] < 1e-2 < errors["eps = 0.01 cells"] < 1 < errors["eps = 1 cells"]
 
 
 def test_without_a_name_all_are_measured(monkeypatch):
@@ -188,18 +173,11 @@ def test_without_a_name_all_are_measured(monkeypatch):
     assert main(["bench"]) == DONE
     monkeypatch.setattr(sys, "argv", ["operators.py"])
     operators.main()
-    pages = "prefilter", "normals", "occlusion", "path_tracer"
+    pages = "prefilter", "occlusion"
     assert asked == [[f"splitnerf_tools.bench.{name}" for name in pages], [f"bench.{name}" for name in operators.NAMES]]
 
 
 class TestSplitSum:
-    def test_a_table_is_met_at_its_nodes_and_linear_between(self):
-        table = np.random.default_rng(0).random((5, 5, 2))
-        nodes = np.linspace(0, 1, 5)
-        np.testing.assert_allclose(split_sum.bilinear(table, nodes, nodes), table, atol=1e-12)
-        middle = split_sum.bilinear(table, nodes[:1], np.array([0.125]))
-        np.testing.assert_allclose(middle[0, 0], (table[0, 0] + table[0, 1]) / 2)
-
     def test_finer_tables_are_better_and_the_fit_is_rough(self):
         chart, chi = split_sum.table_charts((8, 32))
         errors = {(p.series, p.variant): p.error for p in chart.points}
@@ -232,49 +210,3 @@ class TestSplitSum:
         texel = 2 * math.pi**2 / (32 * 64) * math.sin(9.5 / 32 * math.pi)
         found = (light.lamps(light.directions) * light.solid_angles[:, None]).sum(0)
         torch.testing.assert_close(found, sun * texel, rtol=0.02, atol=0)
-
-    def test_the_truth_of_a_small_lamp_has_little_noise(self):
-        """Samples of a wide lobe alone would miss it."""
-        sky = np.full((64, 128, 3), 0.1, np.float32)
-        sky[20, 40] = 1e4
-        torch.manual_seed(0)
-        light = split_sum.SplitLight(sky)
-        errors = split_sum.split_errors(light, Truth(light.whole, 64, 64), *self.looks(), 0.9, 1.0, 1.0, 256)
-        assert 0 < errors[split_sum.NOISE] < 0.01
-
-
-class TestNormals:
-    def test_points_lie_on_the_surface(self):
-        x = normals.on_surface(200)
-        assert normals.surface(x.double()).abs().max() < 1e-6
-        step = 1e-5 * F.normalize(normals.surface_gradient(x), dim=1)
-        assert (normals.surface(x.double() + step) > normals.surface(x.double())).all()
-
-    def test_angles_are_in_degrees(self):
-        a = torch.tensor([[1.0, 0, 0], [0, 0, 2.0]])
-        b = torch.tensor([[0, 3.0, 0], [0, 0, 1.0]])
-        assert normals.angle(a, b) == pytest.approx(45)
-        tiny = torch.tensor([[1.0, 1e-9, 0]], dtype=torch.float64)
-        assert normals.angle(torch.tensor([[1.0, 0, 0]]), tiny) == pytest.approx(math.degrees(1e-9), rel=1e-3)
-
-    def test_differences_come_closer_as_they_shrink(self):
-        """On a field of one level, twice differentiable in a cell but for the softplus: the error falls with eps."""
-        torch.manual_seed(0)
-        field = SdfField(normals.SPEC, normals.BOX).double()
-        x = torch.rand(100, 3, dtype=torch.float64) - 0.5
-        true = normals.analytic(field, x)
-        coarse, fine = (normals.angle(normals.finite_differences(field, x, eps), true) for eps in (1.0, 1e-4))
-        assert fine < 1e-2 * coarse
-
-
-def test_the_path_tracer_converges(tmp_path, monkeypatch):
-    """At least with the root of its samples; a lattice of them does better."""
-    monkeypatch.setenv("SPLITNERF_DATA", str(tmp_path / "none"))
-    result = path_tracer.run(quick=True, rounds=3)
-    errors = {p.variant: p.error for p in result.charts[0].points}
-    assert errors["4 spp"] / errors["64 spp"] > 3.5
-    assert [p.variant for p in result.charts[0].points if p.default] == ["64 spp"]
-
-
-def test_time_to_an_error_follows_the_curve():
-    assert path_tracer.time_to([(1.0, 0.1), (4.0, 0.05), (16.0, 0.025)], 0.0125) == pytest.approx(64)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from bench import hard_scenes, limits
-from bench.swap import PARTS, Canvas, NearestPoints, surface_values
+from bench.swap import PARTS, Canvas, NearestPoints
 from bench.tubes import assemble
 from painted_ball import bare
 from splitnerf.data.asset import Asset
@@ -129,30 +129,13 @@ def test_nearest_points_are_on_the_sheet_that_faces_the_same_way():
         assert found == pytest.approx(points * [1, 1, 0] + [0, 0, side * thickness / 2], abs=1e-5)
 
 
-def test_charts_that_share_texels_are_unwrapped_again():
-    mesh = trimesh.creation.icosphere(subdivisions=1)
-    uv = np.tile(np.float32([[0, 0], [1, 0], [0, 1]]), (len(mesh.faces), 1))
-    corners = mesh.faces.ravel()
-    vertices, normals = (np.asarray(v, np.float32)[corners] for v in (mesh.vertices, mesh.vertex_normals))
-    faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
-    shared = Asset("shared", vertices, faces, normals, np.zeros(len(faces), np.int32), uv=uv)
-    fresh = Canvas(shared, shared, 128).painted(PARTS)
-    assert not np.array_equal(fresh.uv, uv)
-    assert np.array_equal(Canvas(fresh, shared, 128).painted(PARTS).uv, fresh.uv)
-
-
 # ---- hard scenes ----
 
 DETAIL = 0.12
-RANGES = {  # of albedo, roughness, metallic
-    "knot": ((0.028, 0.082), (0.10, 0.31), (0, 0)),
-    "rings": ((0.018, 0.96), (0.10, 0.35), (0, 1)),
-    "basket": ((0.018, 0.87), (0.20, 0.61), (0, 1)),
-}
 
 
 @pytest.mark.parametrize("name", hard_scenes.SCENES)
-def test_hard_scenes_are_closed_and_their_materials_in_range(name, tmp_path):
+def test_hard_scenes_are_closed_and_face_outward(name, tmp_path):
     tubes = hard_scenes.SCENES[name]()
     asset = assemble(name, tubes, DETAIL)
     write_glb(tmp_path / "a.glb", asset)
@@ -166,8 +149,3 @@ def test_hard_scenes_are_closed_and_their_materials_in_range(name, tmp_path):
     assert all(part.is_watertight and part.is_winding_consistent and part.volume > 0 for part in parts)
     flat = trimesh.Trimesh(read.vertices, read.triangles, process=False).face_normals
     assert ((flat * read.normals[read.triangles[:, 0]]).sum(axis=1) > 0).mean() > 0.99
-
-    corners = np.tile(np.eye(3, dtype=np.float32), (len(read.triangles), 1))
-    values = surface_values(read, np.repeat(np.arange(len(read.triangles)), 3), corners)
-    for part, (low, high) in zip(("albedo", "roughness", "metallic"), RANGES[name]):
-        assert low - 3e-3 <= values[part].min() and values[part].max() <= high + 3e-3, part

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 from op_checks import unit
-from reference import drawn_directions
 from splitnerf.data.asset import Asset, Material
 from splitnerf.ops import fibonacci_directions, monte_carlo_light, shade_sums, split_sum_shade, summed_light
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.subjects import MapLight
+from stability.cases import drawn_directions
 
 COSINES, ROUGHNESS, METALLIC = (0.2, 0.5, 0.9), (0.1, 0.4, 0.8), (0.0, 0.5, 1.0)
 ALBEDO = (0.02, 0.1, 0.6)  # black, where Fresnel's term is all that shows, to bright

@@ -19,6 +19,7 @@ from op_cases import (
     cached_occlusion_inputs,
     cached_visibility_inputs,
     check_against_the_cpu,
+    field_gradients,
     lookup_inputs,
     pixel_inputs,
     sdf_field_inputs,
@@ -26,34 +27,19 @@ from op_cases import (
     sparse_inputs,
     truth,
 )
-from op_checks import as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
+from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
 from splitnerf import _core
-from splitnerf.ops import MeshScene, linear_to_srgb
+from splitnerf.ops import linear_to_srgb
+from splitnerf_tools.doctor import cases
 from torch.autograd import forward_ad
 from torch.utils.checkpoint import checkpoint
 
 WRITES_TO_ARGUMENTS = {"adamw_steps_"}  # has no outputs: see test_ops_adamw.py
-# The inputs to which there is a gradient.
+# The positions of the inputs to which there is a gradient.
 DIFFERENTIABLE = {
-    "hash_encode": (0, 1),
-    "sdf_field": range(1, 8),
-    "surface_weights": (0, 1, 3),
-    "composite": (0, 1, 3),
-    "interpolate": (0,),
-    "light_queries": (0, 2),
-    "split_sum_shade": range(9),
-    "shade_sums": (*range(6), 8),
-    "monte_carlo_light": (0, 2, 5),
-    "summed_light": (0, 2, 5),
-    "linear_to_srgb": (0,),
-    "prefilter_light": (3,),
-    "sparse_product": (6,),
-    "light_lookup": (0, 1, 2, 3),
-    "pixel_losses": (0, 1),
-    "gradient_losses": (0,),
-    "quadratic_entropy": (0,),
-    "light_prior": (0,),
+    op: tuple(arguments_of(op).index(name) for name in names.split())
+    for op, names in (cases.DIFFERENTIABLE | {"quadratic_entropy": "x"}).items()
 }
 FORWARD = sorted(name for name in EVERY if "_backward" not in name)
 BEHIND = {
@@ -115,6 +101,12 @@ def far_points(dtype: torch.dtype) -> tuple:
     )
 
 
+def short_gradients(dtype: torch.dtype) -> tuple:
+    """Of lengths from 2e-4 to 1, on both sides of the least that has a direction."""
+    gradients, *rest = field_gradients(dtype)
+    return gradients * torch.logspace(-3.3, -0.3, 40).to(dtype)[torch.arange(40) * 7 % 40][:, None], *rest
+
+
 # Other settings of the same operators: what the first case of each does not reach.
 OTHERS = [
     *(
@@ -146,6 +138,7 @@ OTHERS = [
     ),
     ("cached_visibility", far_points),
     ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
+    ("gradient_losses", short_gradients),
     *(
         (
             "sdf_field",
@@ -408,170 +401,3 @@ def test_nothing_gives_gradients_of_nothing(name):
 
 def test_every_operator_is_asked_about_nothing():
     assert set(FORWARD) == {*BY_POINT, *EMPTY} | ALWAYS_SOME
-
-
-# ---- errors ----
-
-
-def arguments_of(name: str) -> list[str]:
-    return [argument.name for argument in getattr(lib, name).default._schema.arguments]
-
-
-@pytest.mark.parametrize("name", EVERY)
-def test_a_tensor_of_another_shape_or_dtype_is_named(name):
-    """With one more dimension, or of a dtype that no operator takes: operator and argument stand in the message."""
-    inputs, unread = EVERY[name](torch.float32), {"interpolate_backward": ("shaded",)}.get(name, ())
-    for i, (argument, x) in enumerate(zip(arguments_of(name), inputs)):
-        if not isinstance(x, torch.Tensor) or argument in unread:
-            continue
-        any_shape = name.startswith(("linear_to_srgb", "srgb_to_linear"))
-        for wrong in ([] if any_shape else [x[None, None]]) + [x.to(torch.complex64)]:
-            changed = (*inputs[:i], wrong, *inputs[i + 1 :])
-            with pytest.raises(ValueError, match=name) as error:
-                getattr(lib, name)(*changed)
-            assert argument in str(error.value), f"{argument} is missing in {error.value}"
-
-
-def without(x: torch.Tensor, rows: int = 1) -> torch.Tensor:
-    return x[: len(x) - rows]
-
-
-# An operator, the positions of arguments, what takes their place, and words of the message.
-ERRORS = [
-    ("hash_encode", 1, without, "table must be"),
-    ("hash_encode", 2, lambda n: 33, "n_levels must be in [1, 32], got 33"),
-    ("hash_encode", 3, lambda n: 0, "base_resolution must be at least 1, got 0"),
-    ("hash_encode", 4, lambda n: 0.5, "growth must be at least 1, got 0.5"),
-    ("hash_encode", 5, lambda n: 31, "log2_table_size must be in [1, 30], got 31"),
-    ("hash_encode", 6, lambda n: 4, "n_active must be in [0, n_levels], got 4"),
-    ("sdf_field", 3, without, "hidden_length must be"),
-    ("sdf_field", 8, lambda beta: 0.0, "beta and box must be positive"),
-    ("sdf_field", 13, lambda n: 4, "n_active must be in [0, n_levels], got 4"),
-    ("march_rays", 4, lambda box: -1.0, "box"),
-    ("march_rays", 5, lambda step: 0.0, "step"),
-    ("march_rays", 4, lambda box: float(1 << 40), "box must be at most 2^20 steps"),  # which would take for ever
-    ("sparse_product", 0, lambda offsets: offsets - 1, "offsets must ascend within [0, "),
-    ("sparse_product", 0, lambda offsets: offsets + 1, "offsets must ascend within [0, "),
-    ("sparse_product", 0, lambda offsets: offsets.flip(0), "offsets must ascend within [0, "),
-    ("sparse_product", 1, lambda columns: columns + 1, "columns must hold numbers in [0, 64)"),
-    ("sparse_product", 1, lambda columns: columns - 1, "columns must hold numbers in [0, 64)"),
-    ("surface_weights", 4, lambda offsets: offsets + 1, "offsets must rise from 0"),
-    ("surface_weights", 4, lambda offsets: offsets[:0], "offsets must be"),
-    ("surface_weights", 4, lambda offsets: offsets.flip(0), "offsets must rise from 0"),
-    ("surface_weights", 5, lambda step: 0 * step, "step must be positive"),
-    ("surface_weights", 8, lambda n: n + 71, "n_samples must be at most the number of points"),
-    ("composite", 2, lambda offsets: offsets + 1, "offsets must rise from 0"),
-    ("composite", 4, lambda least: 0.0, "least_opacity must be positive"),
-    ("spread_samples", 3, lambda phase: phase + 1, "phase must be in [0, 1)"),
-    ("spread_samples", 4, lambda gap: 0.0, "gap must be positive"),
-    ("spread_samples", 5, lambda n: -1, "per_ray must be in [0, 2^20)"),
-    ("interpolate", 1, lambda first: first + 9, "first must be in [0, 5)"),
-    ("interpolate", 2, lambda second: second - 9, "second must be in [0, 5)"),
-    ("split_sum_shade", 6, lambda diffuse: None, "specular must be [600, 3] float32"),
-    ("split_sum_shade", 10, lambda mode: 3, "fresnel_mode must be 0 (exact), 1 (paper) or 2 (code), got 3"),
-    ("light_queries", 3, lambda lut: lut[1:], "lut must be [32, 32, 4]"),
-    ("shade_sums", 9, lambda share: None, "both or neither"),
-    ("summed_light", 7, without, "sent must hold as many points as normals, or none"),
-    ("gradient_losses", 2, lambda beside: beside + 15, "beside must hold indices of weights"),
-    ("gradient_losses", 0, lambda g: g[:25], "samples and their neighbours"),
-    ("pixel_losses", 3, without, "background must be [600, 3]"),
-    ("pixel_losses_backward", 7, without, "grad_losses must be [2]"),
-    ("quadratic_entropy", 0, lambda x: x[:0], "x must hold at least one point"),
-    ("light_prior", 1, lambda sizes: [], "level_sizes must hold 1 to 16 numbers"),
-    ("light_prior", 1, lambda sizes: [1] * 17, "level_sizes must hold 1 to 16 numbers"),
-    ("light_prior", 1, lambda sizes: [336, 0], "level_sizes must be positive"),
-    ("light_prior", 1, lambda sizes: [3, 4], "level_sizes must sum to the number of texels"),
-    ("prefilter_light", (2, 3), lambda x: x[:0], "light_dirs must hold at least one"),
-    ("prefilter_light", 3, without, "light must be [900, 3]"),
-    ("sample_ggx_lobe", 2, lambda n: 0, "n_samples must be in [1, 2^20]"),
-    ("sparse_product", 6, without, "transposed_offsets must be [64]"),
-    ("light_lookup", 2, without, "levels must hold 336"),
-    ("light_lookup", 3, without, "sh must be [169, 3]"),
-    ("light_lookup", (4, 5), lambda x: without(x, 3), "levels"),
-    ("light_lookup", 5, lambda nodes: nodes.flip(0), "nodes must ascend"),
-    ("light_lookup", 5, without, "nodes must be [4] float64"),
-    ("sample_rays", 7, lambda out: out[:, :3], "out must be [n, 32]"),
-    ("sample_rays", 16, lambda step: 0.0, "step"),
-    ("sample_rays", 24, lambda room: -1, "room must not be negative"),
-    ("draw_rays", 1, lambda n: 301, "n_near must be from 0 to the number of rays"),
-    ("draw_rays", 4, lambda count: 0, "near has runs without pixels"),
-    ("draw_rays", 7, lambda count: 0, "known has no pixels"),
-    ("draw_rays", 10, lambda height: 0, "height and width"),
-    ("draw_rays", (8, 9), lambda x: x[:0], "there are no views"),
-    ("read_pixels", 0, lambda codes: codes.int(), "codes must be uint8, int16 or float32"),
-    ("read_pixels", 0, lambda codes: codes[:, :3], "codes"),
-    ("read_pixels", 0, lambda codes: codes[:0], "there are no photos"),
-    ("read_pixels", 1, lambda index: index + 1, "index must hold numbers of pixels"),
-    ("read_pixels", 2, lambda view: view + 1, "view must hold numbers of photos"),
-    ("read_pixels", 6, without, "edge_ends must be [2]"),
-    ("composite", 3, without, "opacity must be [4]"),
-    *(
-        ("cached_occlusion", i, without, name)
-        for i, name in ((3, "roughness"), (5, "vertex_normals"), (9, "bits"), (10, "hits"), (13, "light"))
-    ),
-    ("cached_occlusion", 7, lambda order: order + 1, "order"),
-    ("cached_occlusion", 11, lambda radiance: radiance[:, :2], "radiance"),
-    ("cached_visibility", 1, without, "normals"),
-    ("visibility_bits", 2, without, "normals must be [9, 3]"),
-    ("visibility_bits", 3, without, "multiple of 32"),
-    ("vertex_grids", 1, lambda radius: 0.0, "radius"),
-    ("occlusion_factors", 2, without, "normals must be [9, 3]"),
-    ("occlusion_factors", 5, lambda sky: sky[:0], "at least one texel"),
-    ("occlusion_factors", 6, lambda n: 0, "n_specular_rays must be in [1, 2^20]"),
-    *(
-        ("incoming_light", i, without, f"{name} must be [9, ")
-        for i, name in (
-            (2, "geometric_normals"),
-            (3, "normals"),
-            (4, "view_dirs"),
-            (5, "albedo"),
-            (6, "roughness"),
-            (7, "metallic"),
-        )
-    ),
-    *(
-        ("incoming_light", i, without, f"{name} must be [78, ")
-        for i, name in ((8, "vertex_normals"), (9, "tangents"), (10, "uv"))
-    ),
-    *(
-        ("incoming_light", i, lambda x: x[..., :1], name)
-        for i, name in ((11, "albedo_map"), (12, "roughness_metallic_map"), (13, "normal_map"))
-    ),
-    *(("incoming_light", i, lambda x: x[:0], "must not be empty") for i in (11, 12, 13, 14)),
-    *(
-        ("incoming_light", i, lambda x: x + torch.nan, f"{name} must be finite")
-        for i, name in (
-            (8, "normals"),
-            (9, "tangents"),
-            (10, "uv"),
-            (13, "normal textures"),
-            (14, "environment radiance"),
-        )
-    ),
-    *(
-        ("incoming_light", i, lambda x, more=more: x + more, name)
-        for i, name in ((11, "albedo"), (12, "roughness and metallic"))
-        for more in (torch.nan, 1.5)
-    ),
-    ("incoming_light", 14, lambda sky: -sky, "not negative"),
-    *(("incoming_light", 15, lambda _, n=n: n, "n_directions must be in [2, 65536]") for n in (1, 1 << 17)),
-    *(("incoming_light", 16, lambda _, n=n: n, "max_bounces must be in [0, 64]") for n in (-1, 65)),
-    *(("incoming_light", 17, lambda _, x=x: x, "clamp_indirect must not be negative") for x in (-1.0, torch.nan)),
-]
-
-
-@pytest.mark.parametrize(("name", "position", "change", "words"), ERRORS)
-def test_what_does_not_fit_is_named(name, position, change, words):
-    inputs = list(EVERY[name](torch.float32))
-    for i in np.atleast_1d(position):
-        inputs[i] = change(inputs[i])
-    with pytest.raises(ValueError, match=name) as error:
-        getattr(lib, name)(*inputs)
-    assert words in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["occlusion_factors", "incoming_light", "visibility_bits"])
-def test_a_released_scene_raises(name):
-    handle = MeshScene(np.eye(3), np.array([[0, 1, 2]])).handle
-    with pytest.raises(IndexError, match=str(handle)):
-        getattr(lib, name)(handle, *EVERY[name](torch.float32)[1:])

@@ -246,22 +246,6 @@ def test_the_environment_is_seen_past_the_roof_alone():
     assert 0.2 < light.visible[counts].mean() < 0.8
 
 
-def test_nothing_arrives_from_below_the_triangle():
-    """The shading normal leans by 60 degrees; a ball below the floor's plane would be seen."""
-    mesh = trimesh.util.concatenate(
-        [grid_mesh(0.2, 1), trimesh.creation.icosphere(2, 0.5).apply_translation((2, 0, -1))]
-    )
-    points = flat_points(60) | {"normals": torch.tensor([[math.sqrt(0.75), 0.0, 0.5]]).repeat(60, 1)}
-    light = incoming_light(plain_surface(mesh), WHITE, **points, n_directions=64)
-    below = light.directions[..., 2] <= 0
-    assert (below & (light.pdf > 0)).sum() > 200
-    assert (light.visible[below] == 0).all() and (light.sent[below] == 0).all()
-    assert (light.visible[~below & (light.pdf > 0)] == 1).all()
-    from_behind = points | {"geometric_normals": -points["geometric_normals"], "normals": points["geometric_normals"]}
-    light = incoming_light(plain_surface(mesh), WHITE, **from_behind, n_directions=64)
-    assert (light.pdf > 0).any() and (light.visible == 0).all() and (light.sent == 0).all()
-
-
 # ---- densities ----
 
 

@@ -39,19 +39,6 @@ def test_a_map_of_several_parts_holds_its_transpose():
     torch.testing.assert_close(dense(SparseMap(*matrix[3:], *matrix[:3])), dense(matrix).T, rtol=0, atol=0)
 
 
-def test_the_bend_above_zero_has_its_own_derivative():
-    _, _, levels, sh, resolutions, nodes, zonal = lookup_inputs()
-    constant, floor = 0.28209479177387814, 1e-3 * 4.0 * 0.28209479177387814  # Y_00 and e
-    sh[0], sh[1:] = 4.0, 0.0
-    sh[2] = -(4.0 * constant + floor) / (zonal[-1, 1] * math.sqrt(3) * constant)  # x = -e towards z
-    leaf, up, one = sh.clone().requires_grad_(), torch.tensor([[0.0, 0, 1]]).double(), torch.ones(1, 1).double()
-    value = light_lookup(up, one, levels, leaf, resolutions, nodes, zonal)
-    value.sum().backward()
-    torch.testing.assert_close(value, torch.full_like(value, floor * math.exp(-2)), rtol=1e-9, atol=0)
-    expected = torch.full((3,), math.exp(-2) * constant * (1 + 2e-3)).double()
-    torch.testing.assert_close(leaf.grad[0], expected, rtol=1e-6, atol=0)
-
-
 def test_many_points_agree_with_few_and_do_not_depend_on_threads():
     inputs = lookup_inputs(torch.float32, 5000)
     few = light_lookup(inputs[0][:37], inputs[1][:37], *inputs[2:])
@@ -67,13 +54,6 @@ def test_many_points_agree_with_few_and_do_not_depend_on_threads():
         torch.set_num_threads(threads)
     for one, three in zip(*results):
         assert torch.equal(one, three)
-
-
-def test_a_level_of_a_linear_function_is_read_at_its_texels():
-    directions, _, levels, *rest = lookup_inputs()
-    levels[:256] = octahedral_directions(16) + 2
-    got = light_lookup(octahedral_directions(16), torch.zeros(256, 1, dtype=torch.float64), levels, *rest)
-    torch.testing.assert_close(got, levels[:256], rtol=0, atol=1e-12)
 
 
 def test_the_lookup_is_continuous_across_every_seam_and_node():

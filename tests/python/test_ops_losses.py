@@ -13,20 +13,6 @@ from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_lo
 # ---- pixels ----
 
 
-def test_an_exposure_is_a_factor_of_the_colours():
-    """Of each channel, and of the gradient; none is the same as 1, and no whole pixel as all that are none."""
-    mean, opacity, target, background, whole, exposure = pixel_inputs(60)
-    ours, theirs = mean.clone().requires_grad_(), mean.clone().requires_grad_()
-    a = pixel_losses(ours, opacity, target, background, whole, exposure)
-    b = pixel_losses(theirs * exposure, opacity, target, background, whole)
-    torch.testing.assert_close(a, b)
-    a.sum().backward()
-    b.sum().backward()
-    torch.testing.assert_close(ours.grad, theirs.grad)
-    none = pixel_losses(mean, opacity, target, background, torch.zeros_like(whole), torch.ones_like(exposure))
-    assert torch.equal(pixel_losses(mean, opacity, target, background), none)
-
-
 def test_a_clipped_photo_asks_only_for_enough():
     bright = torch.full((4, 3), 3.0, requires_grad=True)
     target, opacity = torch.ones(4, 4), torch.ones(4)

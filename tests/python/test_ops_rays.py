@@ -5,26 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 from op_checks import check_error, generator, lib
-from ray_inputs import composite_inputs, packed_samples, surface_case, surface_inputs
+from ray_inputs import packed_samples, surface_inputs
 from splitnerf.ops import PackedSamples, composite, spread_samples, surface_weights
 
 # ---- surface_weights ----
-
-
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_a_fields_outputs_serve_as_they_are(dtype):
-    """Distances in the first of some columns, and other points behind the samples: as without, and gradients 0 there."""
-    *case, n = surface_case(dtype)
-    outputs, gradient, *rest = case
-    leaves = [x.clone().requires_grad_() for x in (outputs, gradient, outputs[:n, 0], gradient[:n])]
-    found = lib.surface_weights(*leaves[:2], *rest, n)
-    expected = lib.surface_weights(*leaves[2:], *rest)
-    for results in (found, expected):
-        sum((x * torch.arange(1.0, x.numel() + 1).view(x.shape)).sum() for x in results).backward()
-    for a, b in zip(found, expected):
-        assert torch.equal(a, b)
-    assert torch.equal(leaves[0].grad[:n, 0], leaves[2].grad) and torch.equal(leaves[1].grad[:n], leaves[3].grad)
-    assert not leaves[0].grad[:, 1:].any() and not leaves[0].grad[n:].any() and not leaves[1].grad[n:].any()
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -167,14 +151,3 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
 
 
 # ---- composite ----
-
-
-def test_a_mean_colour_is_the_sum_over_the_opacity():
-    """Of a ray that is nearly clear over the least opacity, which then has no gradient."""
-    weights, values, offsets = composite_inputs("cpu", torch.float64)
-    opacity = torch.tensor([0.5, 0.0, 0.2, 0.01], dtype=torch.float64, requires_grad=True)
-    mean = composite(weights, values, offsets, opacity, 0.1)
-    torch.testing.assert_close(mean, composite(weights, values, offsets) / torch.tensor([[0.5], [0.1], [0.2], [0.1]]))
-    mean.sum().backward()
-    expected = -mean.detach().sum(1) / opacity.detach()
-    torch.testing.assert_close(opacity.grad, torch.where(opacity.detach() < 0.1, 0.0, expected))

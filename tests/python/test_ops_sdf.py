@@ -206,13 +206,6 @@ def test_a_nan_is_kept_for_the_loss_to_see():
     assert len(samples.t_starts) == int(evaluated.sum()) > 0
 
 
-def test_float32_keeps_what_float64_does():
-    field, rays = bumpy_field(), field_rays()
-    exact, _, _ = sampled(field, rays)
-    single, _, _ = sampled(field.float(), tuple(x.float() for x in rays))
-    assert abs(len(single.t_starts) - len(exact.t_starts)) < 0.01 * len(exact.t_starts)
-
-
 # ---- sdf_field ----
 
 LEARNED = range(1, 8)  # the arguments to which there is a gradient
@@ -226,14 +219,6 @@ def gradients(function, inputs: tuple) -> tuple[tuple, list[torch.Tensor]]:
         (torch.randn(x.shape, generator=generator(i), dtype=torch.float64) * x).sum() for i, x in enumerate(outputs)
     )
     return outputs, list(torch.autograd.grad(total, leaves[1:8]))
-
-
-def test_the_fields_gradient_is_that_of_its_values():
-    field = bumpy_field()
-    x = torch.rand(50, 3, generator=generator(), dtype=torch.float64) * 2 - 1
-    h = 1e-6 * torch.eye(3, dtype=torch.float64)
-    numeric = torch.stack([(field.sdf(x + e) - field.sdf(x - e)) / 2e-6 for e in h], 1)
-    torch.testing.assert_close(field.sample(x).gradient, numeric, rtol=1e-5, atol=1e-7)
 
 
 def test_only_the_length_of_a_row_has_a_length():

@@ -8,7 +8,6 @@ import pytest
 import torch
 from op_cases import drawn_inputs, shared_inputs
 from op_checks import check_error, lib, unit
-from reference import drawn_directions
 from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
 from splitnerf.ops import (
     LightSums,
@@ -21,16 +20,9 @@ from splitnerf.ops import (
     summed_correction,
     summed_light,
 )
+from stability.cases import drawn_directions
 
 # ---- the split sum ----
-
-
-def test_light_queries_end_with_the_normals_on_the_viewers_side():
-    normals, views, roughness, *_ = query_inputs("cpu", torch.float64)
-    directions, asked = light_queries(normals, views, roughness)
-    side = (normals * views).sum(1, keepdim=True).sign()
-    assert (side < 0).any() and torch.equal(directions[7:], side * normals)
-    assert torch.equal(asked, torch.cat([roughness, torch.ones_like(roughness)]))
 
 
 def test_table_made_in_inference_mode_serves_training():

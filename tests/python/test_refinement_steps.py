@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 from painted_ball import sky
-from reference import drawn_directions
 from splitnerf import _core
 from splitnerf.data.environment import sample_environment
 from splitnerf.ops import monte_carlo_light
@@ -17,6 +16,7 @@ from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
 from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
+from stability.cases import drawn_directions
 
 
 def chain(**weights: float) -> Prior:

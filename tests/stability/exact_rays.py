@@ -45,13 +45,3 @@ def surface_weights(row: dict[str, np.ndarray], shared: Rows, step: float, annea
 def log_sigmoid(x):
     """log(1 / (1 + exp(-x)))."""
     return -mp.log1p(mp.exp(-x)) if x > 0 else x - mp.log1p(mp.exp(x))
-
-
-def composite(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    weights = vector(row["weights"])
-    return {"sums": [mp.fsum(w * v for w, v in zip(weights, vector(row["values"][:, c]))) for c in range(3)]}
-
-
-def composite_means(row: dict[str, np.ndarray], shared: Rows, least: float) -> dict[str, list]:
-    divisor = max(mp.mpf(float(row["opacity"][0])), mp.mpf(least))
-    return {"means": [x / divisor for x in composite(row, shared)["sums"]]}

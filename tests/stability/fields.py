@@ -10,7 +10,6 @@ import torch
 from splitnerf import ops
 from splitnerf.ops.hash_grid import rounded
 
-from stability import exact_fields
 from stability.cases import Draw
 from stability.entry import Entry, Rows
 
@@ -92,7 +91,7 @@ def values(rows: Rows, shared: Rows) -> Rows:
     return {"values": ops.sdf_values(rows["positions"], field)[:, None]}
 
 
-def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> Entry:
+def grid_entry(name: str, call, dtype: torch.dtype = torch.float32) -> Entry:
     return Entry(
         name,
         draw=draw_positions,
@@ -103,17 +102,15 @@ def grid_entry(name: str, call, exact, dtype: torch.dtype = torch.float32) -> En
         conditioned=True,
         bound=2e-6,
         gradient_bound=4e-6,
-        exact=exact,
-        exact_bound=1e-14,
         reason=BY_CELL,
     )
 
 
 LEARNED = ("hidden", "hidden_length", "hidden_bias", "out", "out_length", "out_bias")
 ENTRIES = (
-    grid_entry("hash_encode", encoded, exact_fields.hash_encode),
+    grid_entry("hash_encode", encoded),
     *(
-        grid_entry(f"hash_encode, {name}", from_16_bits(dtype), exact_fields.hash_encode, dtype)
+        grid_entry(f"hash_encode, {name}", from_16_bits(dtype), dtype)
         for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
     ),
     Entry(
@@ -125,8 +122,6 @@ ENTRIES = (
         shared=learned() | grid(),
         conditioned=True,
         bound=4e-6,
-        exact=exact_fields.sdf_field,
-        exact_bound=1e-11,
         reason="sums of 15 products, softplus of slope up to 1 and curvature beta / 4, which the condition holds",
     ),
     Entry(
@@ -135,8 +130,6 @@ ENTRIES = (
         shared=network() | grid(),
         conditioned=True,
         bound=4e-6,
-        exact=exact_fields.sdf_values,
-        exact_bound=1e-11,
         reason="the two above",
         draw=lambda draw, n: {"positions": 2 * draw_positions(draw, n)["positions"].clamp(0, 1) - 1},
         repair=lambda rows: {"positions": rows["positions"].clamp(-1, 1)},

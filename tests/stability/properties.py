@@ -240,66 +240,6 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return torch.where(counts > limit, 1.0, worst), rows
 
 
-def drawn_rays(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Through a listed pixel of the part of the list that is the ray's own, along a unit vector, from the view's centre."""
-    views, height, width = 3, 2000, 3000
-    whole = {"generator": draw.generator, "size": (2000,)}
-    apart = torch.randint(1, 3000, **whole)  # from the end of a run to the end of the next
-    ends = apart.cumsum(0)
-    starts = ends - torch.minimum(apart, torch.randint(1, 1000, **whole))
-    last = torch.cumsum(ends - starts, 0)
-    listed = ops.PixelList(last, ends - last, int(last[-1]))
-    matrices = (draw.normal(views, 3, 3) * draw.logarithmic(1e-6, 1e6, views, 1, 1)).float()
-    origins, random = draw.normal(views, 3).float(), draw.shares(n).clamp(max=1 - 6e-8).float()
-    rays_o, rays_d, view, index = ops.draw_rays(random, n, listed, listed, matrices, origins, height, width)
-    run = torch.searchsorted(ends, index, right=True).clamp(max=len(ends) - 1)
-    rank = index - listed.shift[run]
-    part = rank.double() * n / listed.count - torch.arange(n)
-    wrong = (index < starts[run]) | (view != index // (height * width)) | (rays_o != origins[view]).any(1)
-    length = (rays_d.double().norm(dim=1) - 1).abs() - 1e-6
-    outside = torch.maximum(-part - n / listed.count - 1e-6, part - 1 - 1e-6)
-    return torch.where(wrong, 1.0, torch.maximum(length, outside)), {"random": random}
-
-
-def read_photos(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Words of 16 bits over 65535, the photo's own factors, and behind pixels of runs their own colours, to a rounding."""
-
-    def whole(low: int, high: int, *shape: int) -> Tensor:
-        return torch.randint(low, high + 1, shape, generator=draw.generator)
-
-    lengths, gaps = whole(1, 20, 2), whole(1, 20, 2)
-    starts = torch.cumsum(lengths + gaps, 0) - lengths
-    ends, pixels = starts + lengths, 100
-    before = lengths.cumsum(0) - lengths
-    behind = whole(0, 255, int(lengths.sum()), 3).to(torch.uint8)
-    edges = ops.EdgeRuns(starts, ends, before - starts, behind)
-    words = whole(0, 65535, 2 * pixels, 4)
-    index, exposures = whole(0, 2 * pixels - 1, n), draw.logarithmic(1e-6, 1e6, 2, 3).float()
-    random, view = draw.shares(n, 3).float(), index // pixels
-    codes = torch.where(words > 32767, words - 65536, words).to(torch.int16)
-    target, exposure, background, marked = ops.read_pixels(codes, index, view, exposures, random, edges)
-    inside = ((index[:, None] >= starts) & (index[:, None] < ends)).any(1)
-    run = torch.searchsorted(ends, index, right=True).clamp(max=len(ends) - 1)
-    own = behind[(index - starts[run] + before[run]).clamp(0, len(behind) - 1)].double() / 255
-    wrong = (exposure != exposures[view]).any(1) | (marked != inside)
-    expected = torch.where(inside[:, None], own, random.double())
-    error = (
-        torch.cat([target.double() - words[index].double() / 65535, background.double() - expected], 1).abs().amax(1)
-    )
-    return torch.where(wrong, 1.0, error - 1.2e-7), {"index": index, "random": random}
-
-
-def queries_of_light(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """The points' own roughness, then 1; the normals, not behind the surface."""
-    given = draw.directions(n).float(), draw.directions(n).float(), draw.roughness(n).float()
-    directions, asked = ops.light_queries(*given)
-    facing = directions[n:]
-    turned = (facing == given[0]).all(1) | (facing == -given[0]).all(1)
-    same = (asked[:n] == given[2]).all(1) & (asked[n:] == 1).all(1)
-    behind = -(facing.double() * given[1].double()).sum(1) - 4e-7
-    return torch.where(same & turned, behind, 1.0), dict(zip(("normals", "view_dirs", "roughness"), given))
-
-
 def spread(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Shares in [0, 1], neighbours in order, and interpolated constants that stay themselves."""
     samples = 8
@@ -358,15 +298,6 @@ PROPERTIES = (
         chunk=1024,
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
-    Property(
-        "draw_rays", drawn_rays, "a listed pixel of the ray's own part of the list, a unit vector, the view's centre"
-    ),
-    Property(
-        "read_pixels",
-        read_photos,
-        "the value of its code, its photo's factors, its own colour behind it where it has one",
-    ),
-    Property("light_queries, normals", queries_of_light, "normals that do not face away, with a roughness of 1"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),

@@ -189,8 +189,6 @@ ENTRIES = (
         conditioned=True,
         bound=1e-6,
         gradient_bound=1e-6,
-        exact=exact_rays.composite,
-        exact_bound=1e-14,
         reason="sums in float64, rounded once; gradients are sums over the channels",
     ),
     Entry(
@@ -201,8 +199,6 @@ ENTRIES = (
         conditioned=True,
         bound=1e-6,
         gradient_bound=2e-6,
-        exact=partial(exact_rays.composite_means, least=LEAST),
-        exact_bound=1e-14,
         repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
         reason="a sum in float64 and one division",
     ),

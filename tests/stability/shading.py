@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import torch
-from reference import drawn_directions
 from splitnerf import ops
 from splitnerf.ops._library import lib
 from torch import Tensor
 
 from stability import exact_shading
-from stability.cases import Draw, unit
+from stability.cases import Draw, drawn_directions, unit
 from stability.entry import Entry, Rows
 
 UNITS = ("normals", "view_dirs", "light_dirs")

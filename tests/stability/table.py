@@ -10,14 +10,12 @@ from splitnerf_tools.bench.charts import table as table_lines
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
 
-from stability import fields, light, losses, optimiser, properties, rays, shading
+from stability import fields, light, losses, properties, rays, shading
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify
 from stability.search import Result, run
 
-ENTRIES: tuple[Entry, ...] = (
-    shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES + optimiser.ENTRIES
-)
+ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES
 PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
 NAME = "stability"
 SOURCES = ("cpp", "python/splitnerf/ops")

@@ -121,7 +121,7 @@ SPLITNERF_HD Vec3<T> query_direction(const float* lut, bool mean, Vec3<T> normal
 }
 
 template <class T> struct QueryDirectionGrad {
-  Vec3<T> normal, view;
+  Vec3<T> normal;
   T roughness;
 };
 
@@ -132,7 +132,7 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   const Vec3<T> n = normal * sign;
   const T nv = dot(n, view);
   const Vec3<T> w_r = reflect(n, view);
-  QueryDirectionGrad<T> out{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, T(0)};
+  QueryDirectionGrad<T> out{{T(0), T(0), T(0)}, T(0)};
   Vec3<T> grad_n{T(0), T(0), T(0)}, grad_w_r = grad;
   T grad_nv = T(0);
   if (mean) {
@@ -153,7 +153,6 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
   // w_r = 2 nv n - view,  nv = n . view
   grad_n += grad_w_r * (T(2) * nv);
   grad_nv += T(2) * dot(grad_w_r, n);
-  out.view = n * grad_nv - grad_w_r;
   grad_n += view * grad_nv;
   out.normal = grad_n * sign;
   return out;

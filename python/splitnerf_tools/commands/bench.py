@@ -10,9 +10,7 @@ from splitnerf.cli.exit_codes import DONE
 # Modules of splitnerf_tools.bench, each with run(quick, rounds), and what they compare.
 BENCHMARKS = {
     "prefilter": "estimators of the light's integral over a lobe: time against error",
-    "normals": "analytic normals against finite differences: time against angle",
     "occlusion": "traced rays against cached bits, and against Open3D, trimesh and Mitsuba",
-    "path_tracer": "error against time, with Mitsuba",
 }
 
 
