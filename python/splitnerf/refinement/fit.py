@@ -28,6 +28,7 @@ from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp
+from splitnerf.refinement.level import at_level, level_of_light
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
@@ -127,7 +128,10 @@ class Refinement:
         self.vertex_values = [
             torch.from_numpy(np.ascontiguousarray(x, np.float32)) for x in (asset.normals, asset.tangents, asset.uv)
         ]
-        self.light = EnvironmentLight(torch.from_numpy(environment))
+        self.level = level_of_light(self.texels.start)
+        if self.level != 1.0:
+            self.texels.start = at_level(self.texels.start, self.level)
+        self.light = EnvironmentLight(torch.from_numpy(environment) * self.level)
         self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns)
         seen = dataset.surroundings if self.turns is None else None
         self.light_equations = LightEquations(self.light, surroundings=seen)

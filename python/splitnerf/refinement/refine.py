@@ -222,6 +222,7 @@ def record_of(refined: Refined, seconds: float) -> dict:
         "seconds": round(seconds, 1),
         "outline": refined.outline,
         "lamp": lamp,
+        "level": refined.level,
         "saturated": refined.saturated,
         "sweeps": [sweep._asdict() for sweep in refined.sweeps],
     }

@@ -35,6 +35,7 @@ class Refined:
         sweeps: The report of each sweep.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
+        level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`.
     """
 
     asset: Asset
@@ -43,6 +44,7 @@ class Refined:
     sweeps: list[Sweep]
     saturated: float
     lamp: CompactLamp | None
+    level: float
 
 
 class Sweep(NamedTuple):
@@ -180,7 +182,8 @@ class Stage:
         """The result so far."""
         fit = self.fit
         light, saturated = fit.light.radiance().detach().numpy(), float(fit.pixels.saturated.mean())
-        return Refined(fit.texels.asset_with(fit.maps()), light, self.outline, self.sweeps, saturated, self.lamp)
+        asset = fit.texels.asset_with(fit.maps())
+        return Refined(asset, light, self.outline, self.sweeps, saturated, self.lamp, fit.level)
 
 
 def refine(

@@ -1,0 +1,50 @@
+"""The level of the light by what dielectrics reflect."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light
+
+
+def texture_values(albedo: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
+    """[m, 8] values of albedo [m] and metallic [m], with a roughness of 0.3."""
+    roughness, normal = torch.full((len(albedo), 1), 0.3), torch.tensor([[0, 0, 1.0]]).expand(len(albedo), -1)
+    return torch.cat([albedo[:, None].expand(-1, 3), roughness, metallic[:, None], normal], dim=1)
+
+
+def faint_metals(factor: float) -> torch.Tensor:
+    """[160, 8] values with F0 = factor * DIELECTRIC, from bright surfaces with a trace of metallic to dark metals."""
+    metallic = torch.linspace(0.05, 1, 160)
+    return texture_values(DIELECTRIC * (1 + (factor - 1) / metallic), metallic)
+
+
+METAL = texture_values(torch.full((40,), 0.7), torch.full((40,), 0.95))
+
+
+def radiances(values: torch.Tensor, light: float) -> tuple[torch.Tensor, torch.Tensor]:
+    """[m, 3] what scatters and what reflects at normal incidence under a light."""
+    albedo, metallic = values[:, :3], values[:, 4:5]
+    return light * albedo * (1 - metallic), light * (DIELECTRIC * (1 - metallic) + albedo * metallic)
+
+
+@pytest.mark.parametrize("factor", [1.3, 1.9])
+def test_faint_metals_tell_that_the_light_is_too_dark(factor):
+    assert level_of_light(torch.cat([faint_metals(factor), METAL])) == pytest.approx(factor, rel=1e-4)
+
+
+def test_the_level_of_true_dielectrics_and_of_metals_alone_stays():
+    dielectrics = texture_values(torch.linspace(0, 0.9, 50), torch.zeros(50))
+    assert level_of_light(torch.cat([dielectrics, METAL])) == 1.0
+    assert level_of_light(METAL) == 1.0
+    assert level_of_light(torch.cat([faint_metals(1.9)[:4], METAL])) == 1.0  # too few to tell
+
+
+def test_surfaces_look_the_same_at_another_level():
+    faint, factor = faint_metals(1.9), 1.9
+    moved = at_level(torch.cat([faint, METAL]), factor)
+    assert (moved[: len(faint), 4] == 0).all() and (moved[len(faint) :, 4] == METAL[:, 4]).all()
+    torch.testing.assert_close(radiances(moved[: len(faint)], factor), radiances(faint, 1.0))
+    torch.testing.assert_close(moved[len(faint) :, :3] * factor, METAL[:, :3])
+    assert (moved[:, [3, 5, 6, 7]] == torch.cat([faint, METAL])[:, [3, 5, 6, 7]]).all()
+    assert level_of_light(moved) == 1.0
