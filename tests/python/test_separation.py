@@ -33,7 +33,7 @@ from splitnerf_tools.separation.field import (
 )
 from splitnerf_tools.separation.foot import find_foot
 from splitnerf_tools.separation.ground import Table, find_table
-from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors
+from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors, without_specks
 from splitnerf_tools.separation.region import CELLS, Region, find_region
 from tiny_runs import train
 
@@ -117,10 +117,18 @@ class TestRegion:
         post = np.array([0.75, 0, -0.3]) + random.uniform(0, 1, (900, 3)) * [0.1, 0.1, 0.3]
         return np.concatenate([ball, floor, post]) + random.normal(size=(36900, 3)) * 0.004
 
-    def test_the_floor_is_found(self, points):
-        normal, offset = find_table(points, np.zeros(3), np.array([0.1, 0, 0.995]), 3.0, np.random.default_rng(0))
+    @pytest.mark.parametrize("height", [0.0, -0.45], ids=["photos aim at the ball", "photos aim below its foot"])
+    def test_the_floor_is_found(self, points, height):
+        centre, up = np.array([0, 0, height]), np.array([0.1, 0, 0.995])
+        normal, offset = find_table(points, centre, up, 3.0, np.random.default_rng(0))
         np.testing.assert_allclose(normal, [0, 0, 1], atol=2e-3)
         assert offset == pytest.approx(-0.3, abs=2e-3)
+
+    def test_the_top_of_a_box_is_no_table(self):
+        random = np.random.default_rng(0)
+        top = np.column_stack([random.uniform(-0.3, 0.3, (9000, 2)), np.full(9000, 0.2)])
+        side = np.column_stack([np.full(1000, 0.3), random.uniform(-0.3, 0.3, 1000), random.uniform(-0.2, 0.2, 1000)])
+        assert find_table(np.concatenate([top, side]), np.zeros(3), np.array([0, 0, 1.0]), 3.0, random) is None
 
     def test_the_region_is_the_ball(self, points):
         region = find_region(points, Table.through(np.array([0.0, 0, 1]), -0.3, points))
@@ -229,6 +237,15 @@ class TestReading:
         assert photos.masked
         agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
         assert agree.mean() > 0.98
+
+
+def test_specks_beside_the_object_go():
+    mask = np.zeros((40, 60), np.float32)
+    mask[5:35, 5:30], mask[10:20, 40:50], mask[30:32, 50:52] = 0.8, 1.0, 1.0  # the object, its other part, a speck
+    cleaned = mask.copy()
+    cleaned[30:32, 50:52] = 0
+    np.testing.assert_array_equal(without_specks(mask), cleaned)
+    assert not without_specks(np.zeros((4, 5), np.float32)).any()
 
 
 @pytest.mark.parametrize("size", [(41, 55), (37, 93)])

@@ -15,6 +15,8 @@ TABLE_TOLERANCE = 0.006  # distance of the table's points from their plane, in t
 TABLE_TILT = 40.0  # degrees between the table's normal and the mean of the cameras' upward axes
 TABLE_SHARE = 0.15  # of the points near the object that a plane needs to count as a table
 TRIALS = 2000
+CENTRE_BELOW = 0.15  # depth of the centre below a table at most, in the cameras' distances: photos may aim at its foot
+FEW_BELOW = 0.02  # share of the points near the object that may lie below such a table: nothing shows there, but under a lid much
 NOISE = 2.5  # standard deviations of the table's points by which things stand out
 
 
@@ -56,7 +58,7 @@ class Table:
 def find_table(
     points: np.ndarray, centre: np.ndarray, up: np.ndarray, distance: float, random: np.random.Generator
 ) -> tuple[np.ndarray, float] | None:
-    """The plane below the centre on which most points lie.
+    """The plane below the centre, or a little above it with nothing to be seen underneath, on which most points lie.
 
     Args:
         points: [n, 3] sparse points.
@@ -75,10 +77,13 @@ def find_table(
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(lengths, 1e-20)[:, None] * np.sign(normals @ up)[:, None]
-    below = ((centre - corners[:, 0]) * normals).sum(1) > -tolerance
-    for k in np.flatnonzero((lengths > 0) & (normals @ up > np.cos(np.radians(TABLE_TILT))) & below):
-        on = np.abs((points - corners[k, 0]) @ normals[k]) < tolerance
-        if on.sum() > most:
+    above = ((centre - corners[:, 0]) * normals).sum(1)  # height of the centre
+    upright = (lengths > 0) & (normals @ up > np.cos(np.radians(TABLE_TILT)))
+    for k in np.flatnonzero(upright & (above > -CENTRE_BELOW * distance)):
+        heights = (points - corners[k, 0]) @ normals[k]
+        on = np.abs(heights) < tolerance
+        lowest = above[k] > -tolerance or np.mean(heights < -2 * tolerance) < FEW_BELOW
+        if on.sum() > most and lowest:
             best, most = on, on.sum()
     if best is None:
         return None

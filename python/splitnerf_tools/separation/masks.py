@@ -25,6 +25,10 @@ COARSER = 4  # factor by which the first mask is smaller
 RIM = 3  # every other pixel beside a mask in which solid cells say nothing
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
 HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
+SPECK, FAINT = (
+    0.01,
+    0.1,
+)  # size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts
 CONTRAST = 10.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
 POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot
@@ -125,7 +129,15 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
     mask = with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
     photo = torch.from_numpy(dataset.cropped(index, dataset.images[index])[..., :3]).permute(2, 0, 1)
-    return at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy())
+    return without_specks(at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy()))
+
+
+def without_specks(mask: np.ndarray) -> np.ndarray:
+    """A mask [h, w] without parts that are tiny beside its largest: spots of the field's fog."""
+    parts, _ = ndimage.label(mask > FAINT)
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    return np.where((sizes < SPECK * sizes.max())[parts] & (parts > 0), 0, mask).astype(np.float32)
 
 
 def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
