@@ -33,57 +33,29 @@ class Fault(NamedTuple):
     tests: str = "*"
 
 
+def no_barrier(where: str, file: str, behind: str, indent: int, finder: str = "", tests: str = "*") -> Fault:
+    """A barrier that is not there, in the line below the text."""
+    barrier = f"\n{' ' * indent}__syncthreads();"
+    return Fault(f"no barrier {where}", finder, CUDA + file, behind + barrier, behind, tests)
+
+
 FAULTS = (
+    no_barrier("before the totals of a scan's warps are read", "device.cu", "totals[number] = total;", 4),
+    no_barrier("after these were read", "device.cu", "carried += warp.sum(of_warp);", 4, "thread", "*.SampledRays"),
+    no_barrier("between the warps of a block that adds up", "launch.cuh", "= sum;\n  }", 2),
+    no_barrier(
+        "after a tile of the light was cleared", "light_pyramid.cu", "= T(0);", 4, "thread", "LightKernels.Lookup"
+    ),
+    no_barrier("before the prefilter's next tile is written", "prefilter.cu", "items[k].add(source);\n    }", 4),
+    no_barrier("between units of the field and their sums", "sdf_field.cu", "units(layer, tile, given);", 6),
+    no_barrier("before the units' memory is used again", "sdf_field.cu", "units, sum);\n      });", 6),
+    no_barrier("before the copies of summed light are added", "summed_light.cu", "to_copy(Warp{}, p);", 2),
     Fault(
-        "scan: no barrier before the warps' totals are read",
+        "walk: no barrier between a round's inputs and the network",
         "",
-        CUDA + "device.cu",
-        "totals[number] = total;\n    __syncthreads();",
-        "totals[number] = total;",
-    ),
-    Fault(
-        "scan: no barrier after they were read",
-        "thread",
-        CUDA + "device.cu",
-        "carried += warp.sum(of_warp);\n    __syncthreads();",
-        "carried += warp.sum(of_warp);",
-        "*.SampledRays",
-    ),
-    Fault(
-        "sums of a block: no barrier between its warps",
-        "",
-        CUDA + "launch.cuh",
-        "= sum;\n  }\n  __syncthreads();",
-        "= sum;\n  }",
-    ),
-    Fault(
-        "light's gradient: no barrier after the tile was cleared",
-        "thread",
-        CUDA + "light_pyramid.cu",
-        "= T(0);\n    __syncthreads();",
-        "= T(0);",
-        "LightKernels.Lookup",
-    ),
-    Fault(
-        "prefilter: no barrier before the next tile is written",
-        "",
-        CUDA + "prefilter.cu",
-        "items[k].add(source);\n    }\n    __syncthreads();",
-        "items[k].add(source);\n    }",
-    ),
-    Fault(
-        "field's gradient: no barrier between units and their sums",
-        "",
-        CUDA + "sdf_field.cu",
-        "units(layer, tile, given);\n      __syncthreads();",
-        "units(layer, tile, given);",
-    ),
-    Fault(
-        "field's gradient: no barrier before the units' memory is used again",
-        "",
-        CUDA + "sdf_field.cu",
-        "units, sum);\n      });\n      __syncthreads();",
-        "units, sum);\n      });",
+        BODIES + "bodies/sdf_layer.h",
+        "    group.sync();\n    const T of_part",
+        "    const T of_part",
     ),
     Fault(
         "a warp's running sum starts with the own value in lane 0",
@@ -115,25 +87,11 @@ FAULTS = (
         "LightKernels.Lookup",
     ),
     Fault(
-        "walk: no barrier between a round's inputs and the network",
-        "",
-        BODIES + "bodies/sdf_layer.h",
-        "    group.sync();\n    const T of_part",
-        "    const T of_part",
-    ),
-    Fault(
         "cached visibility: only the first 32 vertices are looked at",
         "",
         BODIES + "bodies/visibility_cache.h",
         "first < total; first += Group::size",
         "first < total && first == 0; first += Group::size",
-    ),
-    Fault(
-        "summed light's gradient: no barrier before the copies are added",
-        "",
-        CUDA + "summed_light.cu",
-        "to_copy(Warp{}, p);\n  __syncthreads();",
-        "to_copy(Warp{}, p);",
     ),
     Fault(
         "sparse product: only one lane takes part in the sum",

@@ -226,32 +226,7 @@ def test_states_that_cannot_be_gone_on_from_are_refused():
     assert ours.param_groups[0]["sparse"] and ours.param_groups[0]["lr"] == 0.2
 
 
-# ---- many parameters at once ----
-
-
-@each_device
-@pytest.mark.parametrize("count", [1, 24, 30])
-def test_many_parameters_move_as_each_alone(device, count):
-    """More than one launch takes, of all shapes, each by its own rate, decay, count and sparsity; a copy of two of them."""
-    g = generator()
-    shapes = [SHAPES[k % len(SHAPES)] for k in range(count)]
-    tensors = [[torch.rand(shape, generator=g).to(device) for shape in shapes] for _ in range(4)]
-    for grad in tensors[1][::2]:
-        grad *= (torch.rand(grad.shape, generator=g) < 0.3).to(device)
-    rates, decays, steps = (
-        [f(k) for k in range(count)] for f in (lambda k: 0.01 * k, lambda k: 0.1 * (k % 3), lambda k: 1 + k % 5)
-    )
-    sparse, copied = [k % 2 == 0 for k in range(count)], sorted({0, count - 1})
-    alone = [[x.clone() for x in kind] for kind in tensors]
-    copies = [torch.zeros(shapes[k], dtype=torch.float16, device=device) for k in copied]
-    lib.adamw_steps_(*tensors, rates, 0.9, 0.99, 1e-8, decays, steps, sparse, copies, copied)
-    for k in range(count):
-        copy = [torch.zeros(shapes[k], dtype=torch.float16, device=device)] if k in copied else []
-        of_k = [kind[k : k + 1] for kind in (*alone, rates, decays, steps, sparse)]
-        lib.adamw_steps_(*of_k[:5], 0.9, 0.99, 1e-8, *of_k[5:], copy, [0] * len(copy))
-        for together, one in zip(tensors, alone):
-            assert torch.equal(together[k], one[k]), (k, shapes[k])
-        assert not copy or torch.equal(copies[copied.index(k)], copy[0])
+# ---- steps that are not allowed ----
 
 
 @each_device

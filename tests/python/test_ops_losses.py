@@ -13,6 +13,15 @@ from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_lo
 # ---- pixels ----
 
 
+def test_an_exposure_is_a_factor_of_the_colours():
+    """None is the same as 1, and no whole pixel as all that are none."""
+    *photo, whole, exposure = pixel_inputs()
+    scaled = [photo[0] * exposure, *photo[1:]]
+    torch.testing.assert_close(pixel_losses(*photo, whole, exposure), pixel_losses(*scaled, whole))
+    none = torch.zeros_like(whole), torch.ones_like(exposure)
+    assert torch.equal(pixel_losses(*photo), pixel_losses(*photo, *none))
+
+
 def test_a_clipped_photo_asks_only_for_enough():
     bright = torch.full((4, 3), 3.0, requires_grad=True)
     target, opacity = torch.ones(4, 4), torch.ones(4)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -48,6 +50,11 @@ def test_visibility_agrees_with_embreex(scene):
     visible = scene.is_open(origins, directions).numpy()
     assert visible.dtype == np.bool_ and 0.2 < visible.mean() < 0.9
     assert (visible == ~blocked).mean() > 0.999  # rays through an edge may go either way
+
+
+def test_visibility_ends_at_t_far(scene):
+    origin, down = torch.tensor([[-0.9, 0.0, 5.0]]), torch.tensor([[0.0, 0.0, -1.0]])
+    assert [scene.is_open(origin, down, t).item() for t in (3.9, 4.1, math.inf)] == [True, False, False]
 
 
 def test_bad_meshes_raise():
