@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 import torch
 import trimesh
 from op_checks import generator
 from splitnerf import _core
+from splitnerf.config import Config
+from splitnerf.fields import VisibilityBits
 from splitnerf.ops import MeshScene, VisibilityCache
+from splitnerf.render import model as rendering
+from splitnerf.render.model import SceneModel
 from torch.nn import functional as F
 
 OFFSET = 0.0125
@@ -24,6 +32,29 @@ def scene_of(mesh: trimesh.Trimesh) -> MeshScene:
 def corners(mesh: trimesh.Trimesh) -> tuple[torch.Tensor, torch.Tensor]:
     """The vertices of a mesh and their normals."""
     return tuple(torch.tensor(np.asarray(x), dtype=torch.float32) for x in (mesh.vertices, mesh.vertex_normals))
+
+
+def bits_of(mesh: trimesh.Trimesh, directions: torch.Tensor, **options: object) -> VisibilityBits:
+    """The visibility of a mesh in some directions."""
+    options = {"offset": OFFSET, "n_channels": 3, "indirect": True} | options
+    faces = torch.tensor(np.asarray(mesh.faces))
+    return VisibilityBits.trace(scene_of(mesh), corners(mesh)[0], faces, directions, **options)
+
+
+def refresh(bits: VisibilityBits, light: Callable, materials: Callable, shade: Callable) -> None:
+    """A bounce of indirect light as a model computes it, of other materials and shading; for `shade` see
+    :func:`splitnerf.ops.split_sum_shade`."""
+    scene = SimpleNamespace(config=Config(), bits=bits, cells=SimpleNamespace(turns=None), materials_at=materials)
+    scene.device = torch.device("cpu")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rendering, "split_sum_shade", shade)
+        SceneModel.refresh_indirect(scene, light)
+
+
+def traced(model: SceneModel, mesh: trimesh.Trimesh) -> VisibilityBits:
+    """The visibility of a mesh towards the middles of the model's cells."""
+    vertices, faces = corners(mesh)[0], torch.tensor(np.asarray(mesh.faces))
+    return model.trace(scene_of(mesh), vertices, faces, model.cells.centres)
 
 
 def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:

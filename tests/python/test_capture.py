@@ -20,7 +20,7 @@ from splitnerf.data.environment import seen_at
 from splitnerf.data.frames import TEST_STRIDE
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.errors import InputError
-from splitnerf.fields import EvaluatedLight, LightPyramid
+from splitnerf.fields import LightPyramid
 from splitnerf.files import LOCK, PARTIAL
 from splitnerf.training.losses import SeenLight
 from splitnerf_tools.capture import prepare as preparation
@@ -357,7 +357,7 @@ def test_what_is_seen_pulls_the_light():
     optimiser = torch.optim.Adam(light.parameters(), lr=0.05)
     for _ in range(150):
         optimiser.zero_grad()
-        evaluated = EvaluatedLight(light.evaluate())
+        evaluated = light.evaluate()
         loss = seen.loss(evaluated)
         loss.backward()
         evaluated.backward()

@@ -7,10 +7,10 @@ import math
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, corners, grid_mesh, scene_of
+from mesh_shapes import OFFSET, bits_of, grid_mesh, refresh, scene_of
 from op_checks import generator, unit
-from splitnerf.fields import EvaluatedLight, Light, LightPyramid, OcclusionQuery, VisibilityBits
-from splitnerf.fields.light_pyramid import octahedral_texels
+from splitnerf.fields import Light, LightPyramid, SkyCells
+from splitnerf.fields.light import octahedral_texels
 from splitnerf.ops import cached_visibility
 
 
@@ -48,14 +48,14 @@ def test_few_texels_are_divided():
     light = LightPyramid(16)
     with torch.no_grad():
         light.texels.normal_(generator=generator(2))
-    bits = VisibilityBits(1024, OFFSET, 3, True)
-    cells = bits.cell_light(light.evaluate())
+    sky = SkyCells(1024)
+    cells = sky.light(light.evaluate())
     directions, solid_angles = octahedral_texels(16, torch.device("cpu"))
     assert cells.solid_angles.min() > 0.3 * 4 * math.pi / 1024 and cells.radiance.isfinite().all()
     power = (cells.radiance * cells.solid_angles[:, None]).sum(0)
     torch.testing.assert_close(power, (light.radiance() * solid_angles[:, None]).sum(0), rtol=2e-3, atol=0)
-    assert torch.equal(cells.radiance, bits.cell_light(light).radiance)
-    near = (bits.centres @ directions.T).max(1)
+    assert torch.equal(cells.radiance, sky.light(light).radiance)
+    near = (sky.centres @ directions.T).max(1)
     at_middle = near.values > math.cos(math.radians(1.0))
     torch.testing.assert_close(cells.radiance[at_middle], light.radiance()[near.indices[at_middle]], rtol=1e-4, atol=0)
 
@@ -68,11 +68,11 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
     mesh = trimesh.util.concatenate(
         [grid_mesh(3.0, 60), trimesh.creation.icosphere(3, 0.25).apply_translation((0, 0, 0.7))]
     )
-    scene, faces = scene_of(mesh), torch.tensor(mesh.faces)
+    scene = scene_of(mesh)
     axis = torch.linspace(-1.2, 1.2, 80)
     x = torch.cat([torch.cartesian_prod(axis, axis), torch.zeros(6400, 1)], 1)
     up = torch.tensor([[0.0, 0.0, 1.0]]).expand(6400, 3)
-    query = OcclusionQuery(torch.empty(0), x, up, up, torch.ones(6400, 1))
+    sky, query = SkyCells(256), (x, up, up, torch.ones(6400, 1))
 
     def place(shade: torch.Tensor) -> torch.Tensor:
         return (x * shade[:, None]).sum(0) / shade.sum()
@@ -88,13 +88,11 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
         true = true[(true @ sun).argmax()]
         shadow = ~scene.is_open(x + OFFSET * up, true.expand(6400, 3))
         for aims in (True, False):
-            bits = VisibilityBits(256, OFFSET, 1, indirect=False)
-            lit = EvaluatedLight(light.evaluate())
-            if aims:
-                bits.aim(lit)
-            bits.use(bits.trace(scene, corners(mesh)[0], faces))
-            bits.set_light(lit)
-            apart[aims].append((place(1 - bits(query).diffuse[:, 0]) - place(shadow.float())).norm().item())
+            lit = light.evaluate()
+            towards = sky.aims(lit) if aims else sky.centres
+            bits = bits_of(mesh, towards, n_channels=1, indirect=False)
+            bits.light = sky.light(lit).radiance
+            apart[aims].append((place(1 - bits(*query).diffuse[:, 0]) - place(shadow.float())).norm().item())
     assert max(apart[True]) < 0.01 and max(apart[False]) > 0.03
 
 
@@ -122,18 +120,12 @@ def floor_and_wall() -> trimesh.Trimesh:
 def test_a_mirror_sends_what_stands_in_the_mirror_direction():
     """A wall of mirrors under a sky of colours: each direction brings the colour that it is mirrored to."""
     mesh, sky = floor_and_wall(), Field(lambda w: 1.0 + 0.9 * w)
-    bits = VisibilityBits(256, OFFSET, 3, True)
-    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], torch.tensor(mesh.faces)))
-    lit = EvaluatedLight(sky)
-    bits.set_light(lit)
-
-    def materials(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return torch.ones_like(x), torch.full_like(x[:, :1], 0.05), torch.ones_like(x[:, :1])
-
-    bits.refresh(lit, materials, lambda n, views, here, light_s, light_d: light_s)
+    bits = bits_of(mesh, SkyCells(256).centres)
+    mirror = [torch.ones(1, 3), torch.full((1, 1), 0.05), torch.ones(1, 1)]
+    refresh(bits, sky, lambda x: [part.expand(len(x), -1) for part in mirror], lambda *args: args[5])
     up = torch.tensor([[0.0, 0.0, 1.0]])
     visible, sent = cached_visibility(bits.cache, torch.zeros(1, 3), up, bits.radiance)
-    w = bits.directions
+    w = bits.cache.directions
     to_wall = (visible[0] == 0) & (w[:, 2] > 0.05) & (w[:, 0] > 0.3)
     assert to_wall.sum() > 20
     mirrored = w * torch.tensor([-1.0, 1.0, 1.0])

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 import trimesh
-from mesh_shapes import scene_of
+from mesh_shapes import traced
 from op_checks import generator, unit
+from splitnerf.fields.occlusion import bit_counts
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import find_samples, render_rays
@@ -28,7 +29,7 @@ def with_mesh(mesh: trimesh.Trimesh, **settings: object) -> SceneModel:
     with torch.no_grad():
         model.light.texels.zero_()
     assert not model.sums_light
-    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    model.use_mesh(traced(model, mesh))
     assert model.sums_light
     return model
 
@@ -50,7 +51,7 @@ def test_the_sum_comes_in_smoothly_over_its_band():
     corrections differ by that. Candidates may be any points; those past their number, and narrow lobes, are not corrected."""
     model = with_mesh(trimesh.creation.icosphere(2, 0.5))
     t = torch.tensor([-0.5, 0.0, 0.1, 0.25, 0.5, 0.8, 1.0, 1.7])
-    roughness = (model.occlusion.summed_from + (t - 0.5) * SUMMED_BAND)[:, None]
+    roughness = (model.cells.summed_from + (t - 0.5) * SUMMED_BAND)[:, None]
     light, candidates = model.evaluate_light(), torch.tensor([6, 3, 0, 5, 2, 7, 4])
     expected = (t * t * (3 - 2 * t)).where(t > 0, 0).where(t < 1, 1)
     for n in (None, 7, 4):
@@ -68,7 +69,7 @@ def test_the_sum_comes_in_smoothly_over_its_band():
 def test_the_sum_holds_what_the_mesh_sends():
     """In a bowl that sends out 1, as the sky does, all is lit by 1: less where the mesh is taken to be dark."""
     model = with_mesh(bowl())
-    bits = model.occlusion
+    bits = model.bits
     x, n = bits.cache.vertices[::5], bits.cache.normals[::5]
     inner = x[:, 2] < -0.1
     one = torch.ones(len(x), 1)
@@ -83,8 +84,8 @@ def test_the_sum_holds_what_the_mesh_sends():
 
 def test_visibility_is_asked_on_the_viewers_side():
     model = with_mesh(trimesh.creation.icosphere(2, 0.5))
-    asked, visibility = [], model.occlusion.visibility
-    model.occlusion.visibility = lambda positions, normals: (
+    asked, visibility = [], model.bits.visibility
+    model.bits.visibility = lambda positions, normals: (
         asked.append((positions, normals)) or visibility(positions, normals)
     )
     views, points = points_at(torch.full((6, 1), 0.9), 0.0)
@@ -96,13 +97,13 @@ def test_visibility_is_asked_on_the_viewers_side():
 def test_a_new_mesh_is_lit_and_its_light_bounces_three_times(monkeypatch):
     """By the light of now, before its first bounce."""
     asked = []
-    monkeypatch.setattr(SceneModel, "refresh_indirect", lambda self, light: asked.append(self.occlusion.light.clone()))
+    monkeypatch.setattr(SceneModel, "refresh_indirect", lambda self, light: asked.append(self.bits.light.clone()))
     torch.manual_seed(0)
     model = SceneModel(tiny(n_levels=2))
     with torch.no_grad():
         model.light.texels[:16] = torch.tensor(3.0).log()
     mesh = bowl()
-    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    model.use_mesh(traced(model, mesh))
     assert len(asked) == 3
     torch.testing.assert_close(asked[0], torch.full_like(asked[0], 3.0), rtol=1e-4, atol=1e-4)
 
@@ -111,7 +112,7 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     """Asked on the surface, about each ray's heaviest sample; here it adds the ray's number to its colour."""
     model, cells = ball()
     model.config = model.config.replace({"shading.method": "summed"})
-    model.occlusion.ready = model.occlusion.is_unoccluded = True
+    model.has_mesh = True
     rays = (
         torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]),
         torch.tensor([[-1.0, 0, 0]] * 3),
@@ -204,5 +205,10 @@ def test_normals_are_taken_as_set(name):
 
 
 def test_the_bits_are_made_as_they_are_set():
-    bits = SceneModel(tiny(occlusion_offset=0.03, open_below=0.4, indirect=False, occlusion_directions=288)).occlusion
-    assert (bits.offset, bits.open_below, bits.indirect, len(bits.directions)) == (0.03, 0.4, False, 288)
+    """Rays start farther out and see more of the bowl's sky; it counts as open below a share, and sends nothing."""
+    settings = {"open_below": 0.9, "indirect": False, "occlusion_directions": 288, "occlusion_channels": 1}
+    near, far = (SceneModel(tiny(occlusion_offset=offset, **settings)) for offset in (0.01, 0.2))
+    near, far = (traced(model, bowl()) for model in (near, far))
+    assert near.is_unoccluded and near.emitters is None and near.n_channels == 1 and len(near.light) == 288
+    blocked = [int(bit_counts(bits.cache.bits[:, 1]).sum()) for bits in (near, far)]
+    assert blocked[0] > 1.1 * blocked[1] > 0

@@ -253,7 +253,7 @@ def save_run(run, **state):
         cells=torch.ones(16, 16, 16, dtype=torch.uint8),
         environment=None,
         light_noise=torch.zeros(2, dtype=torch.float64),
-        occlusion_light=model.occlusion.cached_light() | {"sky": torch.ones(256, 3)},
+        occlusion_light={},
         mesh_vertices=None,
         mesh_faces=None,
         cameras=CAMERAS._asdict(),

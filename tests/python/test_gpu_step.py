@@ -110,7 +110,6 @@ class Side(NamedTuple):
         """The training from its checkpoint on a device, all levels open."""
         training = Training(self.dataset, config or self.config, self.run, torch.device(device))
         training.restore()
-        training.take_step.late = None  # each device traces the points of this step
         training.model.open_levels(PROGRESS)
         return training
 

@@ -149,7 +149,7 @@ def decide(step: Fake, what: str) -> dict:
     elif what == "mesh":
         step.mesh.made_at = 0.25
     elif what == "occlusion":
-        step.model.occlusion.ready = True
+        step.model.has_mesh = True
     return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
         what, {}
     )
@@ -258,23 +258,15 @@ def test_a_repeated_step_is_that_of_its_own_inputs(step):
         assert own is not model.variance.grad
 
 
-def test_the_directions_of_the_cells_are_handed_on_too(step):
-    """They are no leaves, and change with the light."""
-    ways(step, 4)
-    light = step.model.evaluate_light()
-    changed = light.with_tensors(light.leaves, [x * 3.0 for x in light.constants])
-    assert step.taken(light=light).value != pytest.approx(step.taken(light=changed).value, rel=1e-3)
-
-
 def test_a_graph_leaves_its_callers_tensors_alone(step):
     """Those that it was recorded with: other steps' numbers go into memory of its own."""
     ways(step, 2)
     light, other = step.model.evaluate_light(), step.model.evaluate_light()
     assert step.taken(light=light).how == "recorded"
-    tensors = [*step.given[0], *step.given[1], *light.leaves, *light.constants]
+    tensors = [*step.given[0], *step.given[1], *light.leaves]
     before = [x.detach().clone() for x in tensors]
     step.scale = 3.0
-    changed = other.with_tensors([2.0 * x.detach() for x in other.leaves], [x + 1.0 for x in other.constants])
+    changed = other.with_leaves([2.0 * x.detach() for x in other.leaves])
     assert step.taken(light=changed, target=5.0).how == "repeated"
     assert all(torch.equal(a, b) for a, b in zip(tensors, before, strict=True))
 

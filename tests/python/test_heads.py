@@ -6,10 +6,14 @@ import math
 
 import pytest
 import torch
+import trimesh
+from mesh_shapes import traced
 from op_checks import generator, unit
 from splitnerf import _core
-from splitnerf.fields import MaterialHead, NoOcclusion, OcclusionHead, OcclusionQuery
+from splitnerf.fields import MaterialHead, Occlusion, OcclusionHead
 from splitnerf.fields.heads import relu_mlp
+from splitnerf.render.model import SceneModel
+from tiny_runs import tiny
 
 
 @pytest.mark.parametrize("n_layers", [1, 3])
@@ -67,77 +71,72 @@ def test_a_roughness_at_the_end_of_its_range_can_be_learned(initial, least, expe
 # ---- occlusion ----
 
 
-def query_of(n: int = 40, n_inputs: int = 7) -> OcclusionQuery:
-    """Points of which each number may have a gradient."""
+def points_of(n: int = 40, n_inputs: int = 7) -> list[torch.Tensor]:
+    """Inputs of the head, axes and roughness of lobes; each may have a gradient."""
     g = generator(3)
-    normals, lobes = (unit(torch.randn(n, 3, generator=g)) for _ in range(2))
-    parts = (
-        torch.randn(n, n_inputs, generator=g),
-        torch.randn(n, 3, generator=g),
-        normals,
-        lobes,
-        torch.rand(n, 1, generator=g),
-    )
-    inputs, *rest = (part.requires_grad_() for part in parts)
-    return OcclusionQuery([inputs], *rest)
+    lobes = unit(torch.randn(n, 3, generator=g))
+    parts = torch.randn(n, n_inputs, generator=g), lobes, torch.rand(n, 1, generator=g)
+    return [part.requires_grad_() for part in parts]
+
+
+def factors_of(head: OcclusionHead) -> Occlusion:
+    inputs, *lobes = points_of()
+    return head([inputs], *lobes)
 
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_the_factors_are_their_own_outputs_and_mostly_open_at_first(channels):
     head = OcclusionHead(7, 8, 1, channels, directional=False)
-    head.use(None)
     with torch.no_grad():
         head.net[-1].weight.zero_()
-    found = head(query_of())
+    found = factors_of(head)
     assert found.diffuse.shape == found.specular.shape == (40, channels)
     for factor in found[:2]:
         torch.testing.assert_close(factor, torch.full_like(factor, 1 / (1 + math.exp(-2))))
     logits = torch.linspace(-3, 2, 2 * channels)
     with torch.no_grad():
         head.net[-1].bias.copy_(logits)
-    found, share = head(query_of()), 1 / (1 + torch.exp(-logits))
+    found, share = factors_of(head), 1 / (1 + torch.exp(-logits))
     torch.testing.assert_close(found.diffuse, share[:channels].expand(40, channels))
     torch.testing.assert_close(found.specular, share[channels:].expand(40, channels))
     assert found.indirect_diffuse is found.indirect_specular is None
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_all_is_open_before_the_first_mesh_without_occlusion_and_where_nothing_is_blocked(channels):
-    head, none = OcclusionHead(7, 8, 1, channels, directional=True), NoOcclusion(channels)
-    found = [head(query_of()), none(query_of())]
-    head.use(None)
-    none.use(None)
-    assert head.ready and not none.ready and head.needs_mesh and not none.needs_mesh
-    assert (head(query_of()).diffuse < 1).all()
-    found.append(none(query_of()))
-    head.is_unoccluded = True
-    found.append(head(query_of()))
-    for occlusion in found:
-        assert torch.equal(occlusion.diffuse, torch.ones(40, channels)) and torch.equal(
-            occlusion.specular, torch.ones(40, channels)
-        )
+@pytest.mark.parametrize("kind", ["mlp", "bits", "off"])
+def test_all_is_open_before_the_first_mesh_without_occlusion_and_where_nothing_is_blocked(kind, channels):
+    """A cube is convex: its bits answer with 1, and the network learns that by itself."""
+    settings = {"occlusion.kind": kind, "occlusion.channels": channels, "shading.method": "split"}
+    model = SceneModel(tiny(**settings))
+    inputs = [torch.rand(40, 13), torch.rand(40, 3), torch.rand(40, model.sdf_field.grid.spec.n_outputs)]
+    points = [torch.rand(40, 3), *(unit(torch.randn(40, 3)) for _ in range(2)), torch.rand(40, 1)]
+    ones = torch.ones(40, channels)
+    for has_mesh in (False, True):
+        if has_mesh:
+            model.use_mesh(None if kind != "bits" else traced(model, trimesh.creation.box()))
+        for factor in model.occlusion_at(inputs, *points)[:2]:
+            assert torch.equal(factor, ones) != (has_mesh and kind == "mlp") and factor.shape == ones.shape
+    assert model.is_unoccluded == (kind == "bits")
 
 
 def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_the_geometry():
-    head, query = OcclusionHead(7, 8, 1, 1, directional=True), query_of()
-    head.use(None)
-    found = head(query)
+    head, (inputs, lobes, roughness) = OcclusionHead(7, 8, 1, 1, directional=True), points_of()
+    found = head([inputs], lobes, roughness)
     (found.diffuse.sum() + found.specular.sum()).backward()
-    assert query.inputs[0].grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
-    assert query.positions.grad is query.normals.grad is query.lobe_dirs.grad is query.roughness.grad is None
+    assert inputs.grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
+    assert lobes.grad is roughness.grad is None
 
 
 def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sphere():
     """Its axis, the five harmonics of degree 2, without a mean or anything in common, the cube of z, and its width."""
     directions = torch.from_numpy(_core.fibonacci_sphere(4096)).float()
     head = OcclusionHead(7, 8, 1, 1, directional=True)
-    head.use(None)
     read = []
     head.net = torch.nn.Sequential(torch.nn.Identity())
     head.net.register_forward_hook(lambda _, inputs, __: read.append(inputs[0]))
     n = len(directions)
-    inputs, normals, roughness = torch.rand(n, 7), directions.flip(0), torch.rand(n, 1, generator=generator())
-    head(OcclusionQuery([inputs], directions, normals, directions, roughness))
+    inputs, roughness = torch.rand(n, 7), torch.rand(n, 1, generator=generator())
+    head([inputs], directions, roughness)
     (read,) = read
     assert read.shape == (n, 17) and torch.equal(read[:, :7], inputs)
     assert torch.equal(read[:, 7:10], directions) and torch.equal(read[:, 16:], roughness)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from splitnerf.fields.visibility import bit_counts
+from splitnerf.fields.occlusion import bit_counts
 from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.ops._library import lib
 

@@ -9,9 +9,16 @@ import torch
 from op_cases import octahedral_directions
 from op_checks import generator, unit
 from precision import precisions
-from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, VisibilityBits, light_pyramid
-from splitnerf.fields.light import LightSamples, lobe_roughness, panorama_directions
-from splitnerf.fields.light_pyramid import chain_resolution, is_resolved, pyramid_filters
+from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, SkyCells
+from splitnerf.fields import light as lights
+from splitnerf.fields.light import (
+    LightSamples,
+    chain_resolution,
+    is_resolved,
+    lobe_roughness,
+    panorama_directions,
+    pyramid_filters,
+)
 from splitnerf.ops import sh_projection
 
 # ---- the number of directions ----
@@ -42,7 +49,7 @@ def test_noise_and_error_are_means_of_the_last_steps():
 # ---- evaluated lights ----
 
 
-BITS = VisibilityBits(64, 0.01, 3, indirect=False)
+CELLS = SkyCells(64)
 W, RHO = unit(torch.randn(30, 3, generator=generator(1))), torch.rand(30, 1, generator=generator(2))
 
 
@@ -56,26 +63,21 @@ def light_of(kind: str, seed: int = 0) -> Light:
 
 
 def evaluated(light: Light) -> EvaluatedLight:
-    maps = light.evaluate()
-    return EvaluatedLight(maps, BITS.cell_light(maps))
+    evaluated = light.evaluate()
+    return evaluated.with_cells(CELLS.light(evaluated))
 
 
 def use(light: EvaluatedLight) -> torch.Tensor:
     """Something that reads all parts of a light."""
-    return (
-        light(W, RHO).square().sum()
-        + (light.cells.radiance.square() * light.cells.solid_angles[:, None]).sum()
-        + light.cells.directions[:, 0].sum()
-    )
+    return light(W, RHO).square().sum() + (light.cells.radiance.square() * light.cells.solid_angles[:, None]).sum()
 
 
 def test_a_light_may_read_other_tensors_and_leaves_its_gradients_there():
-    """Of the pyramid: maps, harmonics and the cells' radiance, whose directions and solid angles have no gradient."""
+    """Of the pyramid: maps, harmonics and the cells' radiance, whose solid angles have no gradient."""
     ours, theirs = evaluated(light_of("pyramid")), evaluated(light_of("pyramid", seed=1))
-    assert len(ours.leaves) == 3 and len(ours.constants) == 2
-    assert ours.constants[0] is ours.cells.directions and ours.constants[1] is ours.cells.solid_angles
+    assert len(ours.leaves) == 3
     leaves = [leaf.detach().clone().requires_grad_() for leaf in theirs.leaves]
-    copy = ours.with_tensors(leaves, [x.clone() for x in theirs.constants])
+    copy = ours.with_leaves(leaves)
     assert len(copy.leaves) == 3 and all(a is b for a, b in zip(copy.leaves, leaves))
     assert use(copy).item() == use(theirs).item() != use(ours).item()
     use(copy).backward()
@@ -86,7 +88,7 @@ def test_a_light_may_read_other_tensors_and_leaves_its_gradients_there():
         for leaf in leaves:
             leaf.mul_(2.0)
     torch.testing.assert_close(copy(W, RHO), 2 * theirs(W, RHO))
-    again = ours.with_tensors(ours.leaves, ours.constants)
+    again = ours.with_leaves(ours.leaves)
     assert use(again).item() == use(ours).item()
 
 
@@ -105,7 +107,7 @@ def test_what_gathers_is_handed_on_whatever_was_read(read):
         assert light.texels.grad is None
     shared.backward()
     gathered, light.texels.grad = light.texels.grad, None
-    loss(light, BITS.cell_light(light)).backward()
+    loss(light, CELLS.light(light)).backward()
     torch.testing.assert_close(gathered, 2 * light.texels.grad)
 
 
@@ -216,9 +218,9 @@ def test_texels_are_read_as_they_are_up_to_a_roughness_of_a_twentieth():
 def test_harmonics_are_those_of_the_averages_where_maps_are_large(monkeypatch):
     """By averages of 16 texels along the edge of 32. c + z + z^3 at roughness 1, where it is the irradiance over pi:
     z^3 = 3/5 P1 + 2/5 P3, of which P1 counts by 2/3 and P3 by nothing."""
-    monkeypatch.setattr(light_pyramid, "SH_RESOLUTION", 16)
+    monkeypatch.setattr(lights, "SH_RESOLUTION", 16)
     filters = pyramid_filters.__wrapped__(32)
-    monkeypatch.setattr(light_pyramid, "filters_on", lambda *_: filters)
+    monkeypatch.setattr(lights, "filters_on", lambda *_: filters)
     assert filters.projected == slice(32 * 32, 32 * 32 + 16 * 16) and filters.projection.shape == (169, 256)
     assert torch.equal(filters.projection, sh_projection(16, cells=True))  # averages are constant in their cells
     light, z = LightPyramid(32), octahedral_directions(32)[:, 2:].float()
@@ -230,5 +232,5 @@ def test_harmonics_are_those_of_the_averages_where_maps_are_large(monkeypatch):
 
 
 def test_harmonics_are_not_rounded_to_tensor_cores():
-    asked = precisions(light_of("pyramid").chain)
+    asked = precisions(light_of("pyramid").parts)
     assert asked["__matmul__"] | asked["matmul"] == {"ieee"}

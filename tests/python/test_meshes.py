@@ -33,21 +33,20 @@ def test_a_mesh_is_the_surface_in_the_whole_box_at_its_resolution():
     assert 5.0 < shape.volume < 10.0 and 1.2 < mesh.current.vertices.abs().max() < 1.6
     cell = 2 * 1.6 / 23
     assert np.sqrt(2) * cell < shape.edges_unique_length.max() < np.sqrt(3) * cell
-    assert mesh.scene is mesh.current.scene and len(model.occlusion.cache.vertices) == len(shape.vertices)
+    assert mesh.scene is mesh.current.scene and len(model.bits.cache.vertices) == len(shape.vertices)
 
 
 @pytest.mark.parametrize("background", [False, True])
 def test_a_mesh_is_traced_where_the_light_is_when_it_is_asked_for(model, background):
     mesh = SurfaceMesh(model, background=background)
-    before = model.occlusion.centres
+    before = model.cells.centres
     for progress in (0.1, 0.2):
         with torch.no_grad():
             model.light.texels.normal_()
         mesh.request(progress)
         mesh.poll(wait=True)
-        found = model.occlusion.directions.clone()
-        model.occlusion.aim(model.evaluate_light())
-        assert torch.equal(found, model.occlusion.aims) and not torch.equal(found, before)
+        found = model.bits.cache.directions
+        assert torch.equal(found, model.aims()) and not torch.equal(found, before)
         before = found
 
 
@@ -64,14 +63,15 @@ def test_a_mesh_made_beside_is_that_of_the_moment_it_was_asked_for(model, monkey
     beside.request(0.3)  # one is being made
     beside.poll()
     assert beside.current is None and beside.asked_at == 0.2
-    assert beside.state() == {"mesh_vertices": None, "mesh_faces": None, "meshed_at": 0.0}
+    before = {name: beside.state()[name] for name in ("mesh_vertices", "mesh_faces", "meshed_at")}
+    assert before == {"mesh_vertices": None, "mesh_faces": None, "meshed_at": 0.0}
     begun.set()
     beside.poll(wait=True)
     assert beside.made_at == 0.2
     for ours, theirs in zip(beside.current[1:3], at_once.current[1:3]):
         assert torch.equal(ours, theirs)
     assert torch.equal(beside.current.bits.cache.bits, at_once.current.bits.cache.bits)
-    assert model.occlusion.ready and torch.equal(model.occlusion.cache.vertices, beside.current.vertices)
+    assert model.has_mesh and torch.equal(model.bits.cache.vertices, beside.current.vertices)
 
 
 @pytest.mark.parametrize("background", [False, True])

@@ -11,7 +11,7 @@ import pytest
 import torch
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.fields import EvaluatedLight, VisibilityBits
+from splitnerf.fields import EvaluatedLight
 from splitnerf.pipeline import load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
@@ -80,12 +80,12 @@ def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_fir
 def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypatch):
     """A mesh from the middle: light every 16 steps, what it sends every 7; three bounces with each new mesh."""
     at = steps_of(monkeypatch)
-    light = calls(monkeypatch, VisibilityBits, "set_light", lambda *_: at[0])
+    light = calls(monkeypatch, SceneModel, "weigh_occlusion", lambda *_: at[0])
     indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
     config = tiny(steps=20, mesh_every=0.5, indirect_every=7, preview_every=2.0, open_below=0.0, levels_open_by=0.0)
     trained = loop.train(load_dataset(data), config, tmp_path)
     assert light == [10, 16, 19] and indirect == [10] * 3 + [14] + [19] * 3
-    assert trained.model.occlusion.ready and trained.scene is not None and trained.finished
+    assert trained.model.has_mesh and trained.scene is not None and trained.finished
 
 
 def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkeypatch):
@@ -249,7 +249,7 @@ def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path)
     for model in (again.model, load_run(tmp_path)[0]):
         assert model.sdf_field.grid.n_active == 2 and torch.equal(model.sdf_field.sdf(x), first.sdf_field.sdf(x))
         for name in ("vertices", "bits"):
-            assert torch.equal(getattr(model.occlusion.cache, name), getattr(first.occlusion.cache, name))
+            assert torch.equal(getattr(model.bits.cache, name), getattr(first.bits.cache, name))
 
 
 def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
@@ -265,9 +265,9 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     one.model.light.loss_samples.restore([0.25, 0.5])
     one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
     one.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
-    cached = one.model.occlusion.cached_light()
+    cached = one.model.bits.state()
     other_light = {name: torch.rand_like(cached[name]) for name in ("sky", "sent") if cached[name] is not None}
-    one.model.occlusion.restore_light(cached | other_light)
+    one.model.bits.restore(cached | other_light)
     one.save()
     kept = load_checkpoint(tmp_path / "checkpoint.pt")
     torch.manual_seed(9)

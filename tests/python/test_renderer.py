@@ -200,10 +200,9 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
         model.variance.fill_(0.37)
     model.config = model.config.replace({"shading.method": "summed"})
     monkeypatch.setattr(model, "surface", Slabs().forward)
-    model.occlusion = Given(
-        lambda query, _: Occlusion(torch.ones(len(query.normals), 1), torch.ones(len(query.normals), 1))
-    )
-    model.occlusion.ready, model.occlusion.cell_light = True, lambda maps: None
+    occlusion = Given(lambda _, x, *__: Occlusion(x.new_ones(len(x), 1), x.new_ones(len(x), 1)))
+    model.has_mesh, model.occlusion_at = True, occlusion.forward
+    monkeypatch.setattr(model, "evaluate_light", model.light.evaluate)
     asked = []
     monkeypatch.setattr(
         model,
@@ -222,7 +221,7 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     ray = rendered(model, find_samples(model, cells, *rays), shades_per_ray=6, capacity=capacity)
     m, n_rays, n_segments = ray.sizes.tolist()
     assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8
-    _, segments = model.occlusion.asked
+    *_, segments = occlusion.asked
     x = ray.positions[:, 0]
     torch.testing.assert_close(
         x[segments.representatives[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05

@@ -6,7 +6,7 @@ import pytest
 import reference
 import torch
 from op_checks import generator, unit
-from splitnerf.fields import EvaluatedLight, Light, Occlusion
+from splitnerf.fields import Light, Occlusion
 from splitnerf.ops import brdf_lut
 from splitnerf.render.model import SceneModel, ShadedPoints
 from test_views import Given
@@ -37,12 +37,12 @@ def shade(light: Light, materials: tuple, occlusion: Occlusion | None = None, **
     model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
     model.light, model.material = light, Given(lambda *_: materials)
     if occlusion is not None:
-        model.occlusion = Given(lambda *_: occlusion)
+        model.occlusion_at = lambda *_: occlusion
     g = generator(4)
     normals = unit(torch.randn(K, 3, generator=g))
     views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
     n_features = model.sdf_field.grid.spec.n_outputs
-    light = EvaluatedLight(model.light.evaluate())
+    light = model.light.evaluate()
     return model.shade(light, torch.zeros(K, 3), torch.zeros(K, 13), torch.zeros(K, n_features), normals, views)
 
 

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 import trimesh
-from mesh_shapes import scene_of
+from mesh_shapes import traced
 from op_checks import generator, unit
 from splitnerf import _core
 from splitnerf.config import Config
@@ -47,7 +47,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     model = SceneModel(Config().replace({"n_levels": 2, "log2_table_size": 8}))
     model.light = Lamp((0.3, -0.5, 0.7))
     mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    model.use_mesh(traced(model, mesh))
     lit = model.evaluate_light()
     g = generator(5)
     n = unit(torch.randn(200, 3, generator=g))
@@ -81,7 +81,7 @@ def test_the_furnace_of_the_whole_model(metallic):
     with torch.no_grad():
         model.light.texels.zero_()  # exp(0) = 1
     mesh = trimesh.creation.icosphere(3, 0.5)
-    model.use_mesh(model.occlusion.trace(scene_of(mesh), torch.tensor(mesh.vertices).float(), torch.tensor(mesh.faces)))
+    model.use_mesh(traced(model, mesh))
     lit = model.evaluate_light()
     g, k = generator(5), 600
     n = unit(torch.randn(k, 3, generator=g))

@@ -19,8 +19,8 @@ from splitnerf.data.environment import sample_environment, turn_environment
 from splitnerf.data.images import read_image, write_image
 from splitnerf.errors import InputError
 from splitnerf.export.glb import write_glb
-from splitnerf.fields import EvaluatedLight, VisibilityBits
-from splitnerf.fields.light_pyramid import LightPyramid
+from splitnerf.fields import LightPyramid, SkyCells
+from splitnerf.fields.light import mean_over
 from splitnerf.pipeline import load_run
 from splitnerf.refinement.fit import FitSettings, Refinement, groups_of
 from splitnerf.render.renderer import render_view
@@ -70,12 +70,11 @@ def test_what_is_no_rotation_is_refused(tmp_path, matrix):
 
 
 def test_points_look_up_the_light_in_its_own_frame():
-    maps, turns = pyramid().evaluate(), random_turns(5)
+    light, turns = pyramid().evaluate(), random_turns(5)
     directions, roughness = torch.nn.functional.normalize(torch.randn(10, 3), dim=1), torch.rand(10, 1)
-    light = EvaluatedLight(maps)
     found = light.turned(turns)(directions, roughness)
-    mean = light.mean_over(turns)(directions, roughness)
-    each = torch.stack([maps(directions @ turn.T, roughness) for turn in turns])
+    mean = mean_over(light, turns)(directions, roughness)
+    each = torch.stack([light(directions @ turn.T, roughness) for turn in turns])
     assert torch.allclose(found, torch.cat([each[i % 5, i : i + 1] for i in range(10)]), rtol=1e-3, atol=1e-4)
     assert torch.allclose(mean, each.mean(0), rtol=1e-3, atol=1e-4)
 
@@ -98,17 +97,16 @@ def test_a_view_under_a_turned_light_is_the_turned_view():
 
 
 def test_cells_have_the_mean_of_the_turned_lights():
-    bits, light = VisibilityBits(256, 0.01, 1, indirect=False), pyramid(1)
+    cells, light = SkyCells(256), pyramid(1)
     turns = about_z(*np.arange(0, 360, 90))
-    bits.turns = torch.from_numpy(turns)
-    bits.aim(EvaluatedLight(light.evaluate()))
-    assert torch.equal(bits.aims, bits.centres)
-    found = bits.cell_light(light.evaluate())
+    cells.turns = torch.from_numpy(turns)
+    assert torch.equal(cells.aims(light.evaluate()), cells.centres)
+    found = cells.light(light.evaluate())
     panorama = light.panorama(64).numpy()
     mean = np.mean([turn_environment(panorama, turn) for turn in turns], axis=0)
-    bits.turns = None
-    fixed = bits.cell_light(light.evaluate())
-    ours, theirs = found.radiance.detach().numpy(), sample_environment(mean, bits.centres.numpy())
+    cells.turns = None
+    fixed = cells.light(light.evaluate())
+    ours, theirs = found.radiance.detach().numpy(), sample_environment(mean, cells.centres.numpy())
     assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.9
     weights = found.solid_angles[:, None] / found.solid_angles.sum()
     assert torch.allclose((found.radiance * weights).sum(0), (fixed.radiance * weights).sum(0), rtol=0.02)

@@ -8,7 +8,7 @@ import pytest
 import torch
 from op_checks import generator, unit
 from splitnerf.config import preset
-from splitnerf.fields import EvaluatedLight, Occlusion, RaySegments
+from splitnerf.fields import Occlusion, RaySegments
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
@@ -22,8 +22,6 @@ LENS = torch.tensor([40.0, 40.0, 12.0, 12.0])
 
 class Given(torch.nn.Module):
     """Answers each point alike, and remembers what it was asked."""
-
-    needs_mesh, ready, is_unoccluded = False, False, False
 
     def __init__(self, answer):
         super().__init__()
@@ -67,9 +65,7 @@ def test_each_map_of_a_view_shows_what_it_is_called():
         lambda x, *_: (colour.expand(len(x), 3), torch.full((len(x), 1), 0.3), torch.full((len(x), 1), 0.6))
     )
     share = torch.tensor([0.7, 0.8, 0.9])
-    model.occlusion = Given(
-        lambda query, _: Occlusion(share.expand(len(query.normals), 3), 0.5 * share.expand(len(query.normals), 3))
-    )
+    model.occlusion_at = lambda _, x, *__: Occlusion(share.expand(len(x), 3), 0.5 * share.expand(len(x), 3))
     maps = render_view(model, cells, POSE, LENS, SIZE, SIZE)
     inside = maps["alpha"] > 0.01
     assert 0.1 < inside.float().mean() < 0.9
@@ -152,35 +148,36 @@ def test_samples_stand_in_their_middles_and_probes_behind_them(min_weight):
 
 def asked_by_shade(**settings) -> tuple:
     model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
-    model.occlusion = Given(lambda query, _: Occlusion(torch.full((40, 1), 0.5), torch.full((40, 1), 0.25)))
+    occlusion = Given(lambda *_: Occlusion(torch.full((40, 1), 0.5), torch.full((40, 1), 0.25)))
+    model.occlusion_at = occlusion.forward
     g = generator(1)
     normals, views = (unit(torch.randn(40, 3, generator=g)) for _ in range(2))
     positions, outputs = torch.randn(40, 3, generator=g), torch.randn(40, 13, generator=g)
     features = torch.randn(40, model.sdf_field.grid.spec.n_outputs, generator=g)
     segments = RaySegments(torch.tensor([0]), torch.zeros(40, dtype=torch.int64))
-    light = EvaluatedLight(model.light.evaluate())
+    light = model.light.evaluate()
     points = model.shade(light, positions, outputs, features, normals, views, segments)
-    return points, model.occlusion.asked, segments, normals, views, positions, outputs, features
+    return points, occlusion.asked, segments, normals, views, positions, outputs, features
 
 
 def test_occlusion_is_asked_on_the_surface_on_the_viewers_side():
     """At x - n f(x), whichever way the normal looks, about the viewer's side of it and the lobe's axis, once a stretch."""
-    points, (query, given), segments, normals, views, positions, outputs, _ = asked_by_shade()
-    torch.testing.assert_close(query.positions, positions - normals * outputs[:, :1])
+    points, (_, x, n, lobe_dirs, roughness, given), segments, normals, views, positions, outputs, _ = asked_by_shade()
+    torch.testing.assert_close(x, positions - normals * outputs[:, :1])
     side = (normals * views).sum(1, keepdim=True).sign()
     assert (side < 0).any() and given is segments
-    for facing in (query.normals, points.facing):
+    for facing in (n, points.facing):
         torch.testing.assert_close(facing, side * normals)
-    assert torch.equal(query.lobe_dirs, points.lobe_dirs) and torch.equal(query.roughness, points.roughness)
+    assert torch.equal(lobe_dirs, points.lobe_dirs) and torch.equal(roughness, points.roughness)
     assert not torch.allclose(points.lobe_dirs, points.facing)
     assert (points.occlusion_d == 0.5).all() and (points.occlusion_s == 0.25).all()
 
 
 def test_heads_read_what_is_set():
     for inputs in ("outputs", "grid"):
-        _, (query, _), *_, positions, outputs, features = asked_by_shade(**{"materials.inputs": inputs})
+        _, (read, *_), *_, positions, outputs, features = asked_by_shade(**{"materials.inputs": inputs})
         expected = outputs if inputs == "outputs" else torch.cat([outputs, positions, features], 1)
-        assert torch.equal(torch.cat(list(query.inputs), 1), expected)
+        assert torch.equal(torch.cat(read, 1), expected)
 
 
 @pytest.mark.parametrize("name", ["reflection", "mean"])
@@ -242,10 +239,8 @@ def test_parts_are_as_large_as_they_are_set():
         assert matrices(model.occlusion.net) == [(18, n_inputs), (18, 18), (6, 18)]
         assert not model.occlusion.directional and model.variance.requires_grad
     assert SceneModel(tiny(light_resolution=32)).light.resolution == 32
-    nothing = SceneModel(
-        tiny(**{"shading.method": "split", "occlusion.kind": "off", "occlusion.channels": 3})
-    ).occlusion
-    assert nothing.n_channels == 3 and not nothing.needs_mesh
+    nothing = SceneModel(tiny(**{"shading.method": "split", "occlusion.kind": "off"}))
+    assert nothing.occlusion is nothing.cells is nothing.aims() is None
 
 
 # ---- the hull of masks ----

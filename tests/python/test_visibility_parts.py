@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, between, corners, grid_mesh, lattice, scene_of
+from mesh_shapes import between, bits_of, corners, grid_mesh, lattice, refresh, scene_of
 from op_checks import generator, unit
-from splitnerf.fields import EvaluatedLight, Light, OcclusionQuery, RaySegments, VisibilityBits, visibility
+from splitnerf.fields import Light, RaySegments, SkyCells, VisibilityBits
 from splitnerf.fields.light import lobe_roughness, panorama_directions
+from splitnerf.fields.occlusion import bit_counts
 from splitnerf.ops import VisibilityCache, cached_occlusion, light_queries
+from splitnerf.render import model as rendering
+from tiny_runs import tiny
 from torch.nn import functional as F
 
 
@@ -22,21 +25,16 @@ def dented() -> trimesh.Trimesh:
     return trimesh.util.concatenate([grid_mesh(2.0, 8), *balls])
 
 
-def faces_of(mesh: trimesh.Trimesh) -> torch.Tensor:
-    return torch.tensor(np.asarray(mesh.faces))
+def bits_on(mesh: trimesh.Trimesh, **settings) -> VisibilityBits:
+    return bits_of(mesh, lattice(256), **settings)
 
 
-def bits_on(mesh: trimesh.Trimesh, n_channels: int = 3, indirect: bool = True, **settings) -> VisibilityBits:
-    bits = VisibilityBits(256, OFFSET, n_channels, indirect, **settings)
-    bits.use(bits.trace(scene_of(mesh), corners(mesh)[0], faces_of(mesh)))
-    return bits
-
-
-def queries(mesh: trimesh.Trimesh, n: int = 80) -> OcclusionQuery:
+def points_on(mesh: trimesh.Trimesh, n: int = 80) -> list[torch.Tensor]:
+    """Positions, normals, axes and roughness of lobes."""
     x, normals = between(mesh, n)
     g = generator(5)
     lobes = unit(normals + 0.8 * unit(torch.randn(n, 3, generator=g)))
-    return OcclusionQuery(torch.empty(n, 0), x, normals, lobes, 0.1 + 0.8 * torch.rand(n, 1, generator=g))
+    return [x, normals, lobes, 0.1 + 0.8 * torch.rand(n, 1, generator=g)]
 
 
 class Painted(Light):
@@ -60,11 +58,7 @@ class Hazy(Painted):
 
 def lit_up(bits: VisibilityBits) -> None:
     """Makes the mesh send colours of its own, after the place of each vertex."""
-    bits.refresh(
-        EvaluatedLight(Painted()),
-        lambda x: (0.5 + x.abs(), torch.full_like(x[:, :1], 0.5), torch.zeros_like(x[:, :1])),
-        lambda n, views, here, light_s, light_d: here[0],
-    )
+    bits.set_radiance((0.5 + bits.cache.vertices[bits.emitters.vertices].abs()) * bits.emitters.facing)
 
 
 # ---- a mesh ----
@@ -73,9 +67,9 @@ def lit_up(bits: VisibilityBits) -> None:
 def test_the_numbers_of_set_bits():
     words = torch.randint(-(2**31), 2**31, (50, 3), generator=generator(), dtype=torch.int64).to(torch.int32)
     expected = [sum(bin(w & 0xFFFFFFFF).count("1") for w in row) for row in words.tolist()]
-    assert visibility.bit_counts(words).tolist() == expected
-    assert visibility.bit_counts(words[:, ::2]).tolist() != expected
-    assert visibility.bit_counts(torch.full((2, 16), -1, dtype=torch.int32)).tolist() == [512, 512]
+    assert bit_counts(words).tolist() == expected
+    assert bit_counts(words[:, ::2]).tolist() != expected
+    assert bit_counts(torch.full((2, 16), -1, dtype=torch.int32)).tolist() == [512, 512]
 
 
 @pytest.mark.parametrize("indirect", [True, False])
@@ -83,18 +77,15 @@ def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
     """From the offset along the normals, in the directions of the light, as many vertices as came, though two are in
     one place; what they hit where it counts, by the number of the emitter."""
     mesh = dented()
-    vertices, faces = corners(mesh)[0], faces_of(mesh)
+    vertices, faces = corners(mesh)[0], torch.tensor(np.asarray(mesh.faces))
     vertices, faces = torch.cat([vertices, vertices[faces[-1]]]), faces.clone()
     faces[-1] = torch.arange(3) + len(vertices) - 3
     again = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
     normals = torch.tensor(np.array(again.vertex_normals)).float()
-    bits = VisibilityBits(256, 0.03, 3, indirect)
-    for towards in (lattice(256), None):
-        if towards is None:
-            bits.aim(EvaluatedLight(Painted()))
-            towards = bits.aims
-            assert not torch.equal(towards, lattice(256))
-        traced = bits.trace(scene_of(mesh), vertices, faces)
+    for towards in (lattice(256), SkyCells(256).aims(Painted().evaluate())):
+        traced = VisibilityBits.trace(
+            scene_of(mesh), vertices, faces, towards, offset=0.03, n_channels=3, indirect=indirect
+        )
         expected = VisibilityCache.trace(
             scene_of(mesh), vertices, normals, float(again.area), towards, offset=0.03, with_hits=True
         )
@@ -119,9 +110,9 @@ def test_a_emitter_knows_its_sides_and_what_it_mirrors():
     is nearest to the mirrored one."""
     bits = bits_on(dented())
     emitters, n = bits.emitters, bits.cache.normals[bits.emitters.vertices]
-    ray = bits.directions[emitters.directions]
+    ray = bits.cache.directions[emitters.directions]
     mirrored = ray - 2 * (ray * n).sum(1, keepdim=True) * n
-    nearest = ((mirrored[:, None] - bits.directions) ** 2).sum(-1)
+    nearest = ((mirrored[:, None] - bits.cache.directions) ** 2).sum(-1)
     least, found = nearest.topk(2, largest=False)
     clear = least[:, 1] - least[:, 0] > 1e-5
     expected = bits.cache.hits[emitters.vertices, found[:, 0]].long()
@@ -135,27 +126,18 @@ def test_a_mesh_is_convex_whose_every_vertex_sees_all_but_a_share_of_its_sky():
     mesh = grid_mesh(1.0, 4)
     mesh = trimesh.util.concatenate([mesh, trimesh.creation.icosphere(3, 0.3).apply_translation((0.2, 0, 0.6))])
     bits = bits_on(mesh)
-    counts = [visibility.bit_counts(bits.cache.bits[:, side]) for side in (0, 1)]
+    counts = [bit_counts(bits.cache.bits[:, side]) for side in (0, 1)]
     largest = (counts[1] / (counts[0] + counts[1])).max().item()
     assert 0.05 < largest < 0.6
     for threshold, expected in ((largest - 1e-4, False), (largest, False), (largest + 1e-4, True), (0.0, False)):
         assert bits_on(mesh, open_below=threshold).is_unoccluded is expected, threshold
 
 
-def test_a_new_mesh_takes_the_place_of_the_one_before():
-    """With its bits, directions and emitters, its convexity, and no light of its own."""
-    bits = bits_on(dented(), open_below=0.02)
-    assert bits.ready and not bits.is_unoccluded
-    lit_up(bits)
-    assert len(bits.radiance) == len(bits.emitters.vertices) > 0
-    ball, place = trimesh.creation.icosphere(2), bits.directions.data_ptr()
-    bits.aim(EvaluatedLight(Painted()))
-    bits.use(bits.trace(scene_of(ball), corners(ball)[0], faces_of(ball)))
-    assert bits.is_unoccluded and bits.radiance is None and len(bits.cache.vertices) == len(ball.vertices)
-    assert torch.equal(bits.directions, bits.aims) and bits.directions.data_ptr() == place
-    assert not torch.equal(bits.directions, bits.centres) and len(bits.emitters.vertices) == 0
-    assert not VisibilityBits(256, OFFSET, 3, True).ready
-    visible, sent = bits.visibility(torch.zeros(5, 3), torch.ones(5, 3))
+def test_all_of_the_sky_is_seen_from_what_counts_as_convex():
+    ball = bits_on(trimesh.creation.icosphere(2), open_below=0.02)
+    assert ball.is_unoccluded and len(ball.emitters.vertices) == 0 and ball.radiance is None
+    assert torch.equal(ball.light, torch.ones(256, 3))  # geometry alone before the first light
+    visible, sent = ball.visibility(torch.zeros(5, 3), torch.ones(5, 3))
     assert torch.equal(visible, torch.ones(5, 256)) and sent is None
 
 
@@ -164,13 +146,9 @@ def test_a_new_mesh_takes_the_place_of_the_one_before():
 
 def test_light_is_averaged_over_the_texels_that_are_nearest_to_a_direction():
     """By solid angle, as rough as a texel is wide, 8 texels or more a direction. Rays are aimed where the power is, which
-    moves no cell; the light's directions are those of the rays that were traced."""
-    bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
-    bits.aim(EvaluatedLight(light))
-    assert torch.equal(bits.cell_light(light).directions, lattice(64))
-    traced = VisibilityBits(64, OFFSET, 3, True)
-    traced.directions.copy_(bits.aims)
-    cells = traced.cell_light(light)
+    moves no cell."""
+    sky, light = SkyCells(64), Painted()
+    aims, cells = sky.aims(light.evaluate()), sky.light(light)
     rows = math.isqrt(len(light.roughness) // 2)
     w = panorama_directions(rows).reshape(-1, 3)
     assert len(w) == len(light.roughness) >= 8 * 64 > len(panorama_directions(rows - 1).reshape(-1, 3))
@@ -183,48 +161,45 @@ def test_light_is_averaged_over_the_texels_that_are_nearest_to_a_direction():
         torch.testing.assert_close(cells.radiance[k], (value * area)[mine].sum(0) / area[mine].sum())
         torch.testing.assert_close(cells.solid_angles[k], 4 * math.pi * area[mine].sum() / area.sum())
         power = (value * area)[mine].sum(1, keepdim=True)
-        torch.testing.assert_close(bits.aims[k], F.normalize((w[mine] * power).sum(0), dim=0))
-    assert torch.equal(cells.directions, bits.aims) and not bits.aims.requires_grad
-    assert cells.radiance.requires_grad and not cells.directions.requires_grad and not cells.solid_angles.requires_grad
+        torch.testing.assert_close(aims[k], F.normalize((w[mine] * power).sum(0), dim=0))
+    assert cells.radiance.requires_grad and not aims.requires_grad and not cells.solid_angles.requires_grad
+    assert not sky.state_dict()
 
 
 def test_rays_go_to_the_middles_of_cells_that_are_dark():
-    bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
-    bits.aim(EvaluatedLight(light))
+    light = Painted()
     with torch.no_grad():
         light.level.zero_()
-    bits.aim(EvaluatedLight(light))
-    torch.testing.assert_close(bits.aims, lattice(64))
+    torch.testing.assert_close(SkyCells(64).aims(light.evaluate()), lattice(64))
 
 
 def test_the_light_is_kept_in_its_place_for_recorded_steps():
-    bits, light = VisibilityBits(64, OFFSET, 3, True), Painted()
-    assert torch.equal(bits.light, torch.ones(64, 3))  # geometry alone before the first light
-    place = bits.light.data_ptr()
-    expected = bits.cell_light(light)
-    bits.set_light(EvaluatedLight(light))
-    assert torch.equal(bits.light, expected.radiance) and not bits.light.requires_grad
-    bits.set_light(EvaluatedLight(light, expected._replace(radiance=2 * expected.radiance)))
-    assert torch.equal(bits.light, 2 * expected.radiance)
-    bits.restore_light({"sky": expected.radiance.detach(), "sent": None, "emitters": None})
-    assert torch.equal(bits.light, expected.radiance) and bits.light.data_ptr() == place
-    assert not bits.state_dict()
+    """By the model, from the cells of an evaluated light or from its texels."""
+    model = rendering.SceneModel(tiny(occlusion_directions=256, n_levels=2))
+    model.bits, light = bits_on(dented()), Painted()
+    place, expected = model.bits.light.data_ptr(), model.cells.light(light)
+    model.weigh_occlusion(light.evaluate())
+    assert torch.equal(model.bits.light, expected.radiance) and not model.bits.light.requires_grad
+    model.weigh_occlusion(light.evaluate().with_cells(expected._replace(radiance=2 * expected.radiance)))
+    assert torch.equal(model.bits.light, 2 * expected.radiance)
+    model.bits.restore({"sky": expected.radiance.detach(), "sent": None, "emitters": None})
+    assert torch.equal(model.bits.light, expected.radiance) and model.bits.light.data_ptr() == place
 
 
 def test_light_of_other_emitters_comes_back_to_those_that_are_there():
     """Rays of another machine may hit a few others: those that are not stored keep what they have."""
     bits = bits_on(dented())
     lit_up(bits)
-    before, kept = bits.radiance.clone(), bits.cached_light()
+    before, kept = bits.radiance.clone(), bits.state()
     numbers = bits.emitters.vertices * 256 + bits.emitters.directions
     assert torch.equal(kept["emitters"], numbers) and (numbers.diff() > 0).all()
     lost = torch.arange(len(numbers)) % 3 == 1
     strange = torch.tensor([n for n in range(numbers[-1] + 9) if n not in set(numbers.tolist())][::50])
     theirs, order = torch.cat([numbers[~lost], strange]).sort()
     sent = torch.cat([2 * before[~lost], torch.full((len(strange), 3), 77.0)])[order]
-    bits.restore_light(kept | {"sent": sent, "emitters": theirs})
+    bits.restore(kept | {"sent": sent, "emitters": theirs})
     torch.testing.assert_close(bits.radiance, torch.where(lost[:, None], before, 2 * before))
-    bits.restore_light(kept | {"sent": None, "emitters": None})
+    bits.restore(kept | {"sent": None, "emitters": None})
     assert bits.radiance is None
 
 
@@ -232,9 +207,9 @@ def test_light_of_other_emitters_comes_back_to_those_that_are_there():
 def test_each_emitter_sends_what_it_reflects(monkeypatch, chunk):
     """The materials of its vertex under the light there, towards the ray that sees it, in parts; again in the same
     memory, after the first was read. Its mirror shows the sky, blurred by a cell, or what another emitter sent before."""
-    monkeypatch.setattr(visibility, "SHADED_CHUNK", {"cpu": chunk})
-    bits, light, asked, seen, before = bits_on(dented()), EvaluatedLight(Hazy()), [], [], []
-    bits.set_light(light)
+    monkeypatch.setattr(rendering, "SHADED_CHUNK", {"cpu": chunk})
+    bits, light, asked, seen, before = bits_on(dented()), Hazy().evaluate(), [], [], []
+    bits.light = SkyCells(256).light(light).radiance.detach()
     cache, emitters = bits.cache, bits.emitters
 
     def materials(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
@@ -242,19 +217,19 @@ def test_each_emitter_sends_what_it_reflects(monkeypatch, chunk):
         asked.append(x)
         return x.abs(), 0.3 + 0.2 * x[:, :1], 7 * x[:, 1:2]
 
-    def reflect(n, views, here, light_s, light_d) -> torch.Tensor:
-        assert len(n) <= chunk and not torch.is_grad_enabled()
-        seen.append((n, views, *here, light_s, light_d))
+    def shade(n, views, albedo, roughness, metallic, light_s, light_d, o_s, o_d, *_) -> torch.Tensor:
+        assert len(n) <= chunk and not torch.is_grad_enabled() and o_s.eq(1).all() and o_d.eq(1).all()
+        seen.append((n, views, albedo, roughness, metallic, light_s, light_d))
         before.append(bits.radiance if bits.radiance is None else bits.radiance.clone())
-        return torch.stack([here[0][:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1)
+        return torch.stack([albedo[:, 0], views[:, 1] + light_s[:, 1], light_d[:, 2]], 1)
 
     x, n, rho = cache.vertices, cache.normals, 0.3 + 0.2 * cache.vertices[:, :1]
-    at, views, up = emitters.vertices, -bits.directions[emitters.directions], torch.ones(len(x), 1)
+    at, views, up = emitters.vertices, -cache.directions[emitters.directions], torch.ones(len(x), 1)
     here, previous = (x.abs()[at], rho[at], 7 * x[at, 1:2]), None
     for turn in range(3):
         asked.clear(), seen.clear(), before.clear()
         place = None if previous is None else bits.radiance.data_ptr()
-        bits.refresh(light, materials, reflect)
+        refresh(bits, light, materials, shade)
         assert torch.equal(torch.cat(asked), x) and len(seen) == math.ceil(len(at) / chunk)
         assert all((b is previous is None) or torch.equal(b, previous) for b in before)
         o_d, _, i_d, _ = cached_occlusion(cache, x, n, n, rho, bits.light, previous)
@@ -272,14 +247,14 @@ def test_each_emitter_sends_what_it_reflects(monkeypatch, chunk):
 
 
 def test_light_of_the_mesh_is_not_asked_for_where_it_does_not_count():
-    """Without indirect light, before a mesh, and on one that hides nothing."""
+    """Without indirect light, and on a mesh that hides nothing."""
 
     def asked(*args: object) -> torch.Tensor:
         raise AssertionError("is not asked")
 
     ball = bits_on(trimesh.creation.icosphere(2), open_below=0.02)
-    for bits in (bits_on(dented(), indirect=False), VisibilityBits(64, OFFSET, 3, True), ball):
-        bits.refresh(asked, asked, asked)
+    for bits in (bits_on(dented(), indirect=False), ball):
+        refresh(bits, asked, asked, asked)
         assert bits.radiance is None
 
 
@@ -291,15 +266,15 @@ def test_light_of_the_mesh_is_not_asked_for_where_it_does_not_count():
 def test_factors_are_those_of_the_cache_under_the_light_that_is_kept(n_channels, sends):
     """Averaged over the channels where that is set; the light from the mesh keeps its colour."""
     mesh = dented()
-    bits, q = bits_on(mesh, n_channels), queries(mesh)
-    bits.set_light(EvaluatedLight(Painted()))
+    bits, points = bits_on(mesh, n_channels=n_channels), points_on(mesh)
+    bits.light = SkyCells(256).light(Painted()).radiance.detach()
     if sends:
         lit_up(bits)
-    o_d, o_s, i_d, i_s = cached_occlusion(bits.cache, *q[1:], bits.light, bits.radiance)
+    o_d, o_s, i_d, i_s = cached_occlusion(bits.cache, *points, bits.light, bits.radiance)
     assert (o_d - o_s).abs().max() > 0.1 and (o_d.amax(1) - o_d.amin(1)).max() > 0.05
     if n_channels == 1:
         o_d, o_s = (x.sum(1, keepdim=True) / 3 for x in (o_d, o_s))
-    found = bits(q)
+    found = bits(*points)
     torch.testing.assert_close(found.diffuse, o_d)
     torch.testing.assert_close(found.specular, o_s)
     if sends:
@@ -312,15 +287,15 @@ def test_factors_are_those_of_the_cache_under_the_light_that_is_kept(n_channels,
 def test_a_segment_has_the_factors_of_its_leader():
     """Whatever the numbers of the leaders, and in whatever order the segments come."""
     mesh = dented()
-    bits, q = bits_on(mesh), queries(mesh)
+    bits, points = bits_on(mesh), points_on(mesh)
     leaders, segment = torch.tensor([70, 3, 41]), torch.randint(3, (80,), generator=generator(6))
     lit_up(bits)
-    alone = bits(q)
-    for found, expected in zip(bits(q, RaySegments(leaders, segment)), alone):
+    alone = bits(*points)
+    for found, expected in zip(bits(*points, RaySegments(leaders, segment)), alone):
         assert torch.equal(found, expected[leaders[segment]]) and not torch.equal(found, expected)
 
 
 def test_lobes_are_summed_where_15_directions_are_within_them():
     """A lobe of roughness r holds 3 k r^4 of k directions."""
     for k in (64, 256, 1024):
-        assert 3 * k * VisibilityBits(k, OFFSET, 3, True).summed_from ** 4 == pytest.approx(15)
+        assert 3 * k * SkyCells(k).summed_from ** 4 == pytest.approx(15)

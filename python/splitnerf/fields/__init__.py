@@ -1,19 +1,9 @@
 """The learned functions of space and direction: SDF, materials, occlusion factors and light."""
 
-from splitnerf.fields.heads import MaterialHead
-from splitnerf.fields.light import EvaluatedLight, Light
-from splitnerf.fields.light_mlp import LightMlp
-from splitnerf.fields.light_pyramid import LightPyramid
-from splitnerf.fields.occlusion import (
-    NoOcclusion,
-    Occlusion,
-    OcclusionHead,
-    OcclusionModel,
-    OcclusionQuery,
-    RaySegments,
-)
+from splitnerf.fields.heads import MaterialHead, OcclusionHead
+from splitnerf.fields.light import EvaluatedLight, Light, LightMlp, LightPyramid
+from splitnerf.fields.occlusion import Occlusion, RaySegments, SkyCells, VisibilityBits
 from splitnerf.fields.sdf import SdfField
-from splitnerf.fields.visibility import VisibilityBits
 
 __all__ = [
     "EvaluatedLight",
@@ -21,12 +11,10 @@ __all__ = [
     "LightMlp",
     "LightPyramid",
     "MaterialHead",
-    "NoOcclusion",
     "Occlusion",
     "OcclusionHead",
-    "OcclusionModel",
-    "OcclusionQuery",
     "RaySegments",
     "SdfField",
+    "SkyCells",
     "VisibilityBits",
 ]

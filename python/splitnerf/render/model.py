@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from splitnerf.config import Config
 from splitnerf.fields import (
@@ -15,17 +16,16 @@ from splitnerf.fields import (
     LightMlp,
     LightPyramid,
     MaterialHead,
-    NoOcclusion,
+    Occlusion,
     OcclusionHead,
-    OcclusionModel,
-    OcclusionQuery,
     RaySegments,
     SdfField,
+    SkyCells,
     VisibilityBits,
 )
-from splitnerf.fields.occlusion import TracedBits
+from splitnerf.fields.light import lobe_roughness, mean_over
 from splitnerf.fields.sdf import SdfSample
-from splitnerf.ops import HashGridSpec, light_queries, split_sum_shade, summed_correction
+from splitnerf.ops import HashGridSpec, MeshScene, cached_occlusion, light_queries, split_sum_shade, summed_correction
 
 ENVIRONMENT_ROWS = 128  # of the image of a trained light
 N_FEATURES = 2  # of a level of the hash grid
@@ -33,6 +33,7 @@ N_OUTPUTS = 13  # of the surface's network, the distance among them
 HEAD_LAYERS = 2  # hidden layers of the networks of material and occlusion
 TURNS = 16  # rotations of the light over which that of the cached occlusion is averaged
 START_BOUNCES = 3  # bounces of indirect light on a new mesh
+SHADED_CHUNK = {"cpu": 1 << 15, "cuda": 1 << 20}  # vertices or emitters of a mesh shaded at a time
 SUMMED_BAND = 0.15  # width in roughness of the transition from the split sum to the sum over directions
 
 
@@ -102,29 +103,17 @@ def make_light(config: Config) -> Light:
     )
 
 
-def make_occlusion(config: Config, n_inputs: int) -> OcclusionModel:
-    """The occlusion that the setting ``occlusion.kind`` names."""
-    c = config
-    if c.occlusion.kind == "mlp":
-        return OcclusionHead(
-            n_inputs, c.constants.occlusion_width, HEAD_LAYERS, c.occlusion.channels, c.occlusion.directional
-        )
-    if c.occlusion.kind == "bits":
-        return VisibilityBits(
-            c.constants.occlusion_directions,
-            c.constants.occlusion_offset,
-            c.occlusion.channels,
-            c.occlusion.indirect,
-            c.constants.open_below,
-        )
-    return NoOcclusion(c.occlusion.channels)
-
-
 class SceneModel(nn.Module):
-    """All learned parts of a scene.
+    """All learned parts of a scene, and the visibility of its newest mesh.
 
     Args:
         config: The run's settings.
+
+    Attributes:
+        occlusion: The network of occlusion factors; None where they are cached, or there are none.
+        cells: The cells of the sky towards which visibility is cached; None where it is not.
+        bits: The cached visibility of the newest mesh; None before the first one.
+        has_mesh: Whether there was a mesh yet. Before, and without occlusion, all factors are 1.
     """
 
     def __init__(self, config: Config):
@@ -149,7 +138,12 @@ class SceneModel(nn.Module):
             config.constants.initial_roughness,
             config.constants.min_roughness,
         )
-        self.occlusion = make_occlusion(config, n_inputs)
+        c, kind = config.constants, config.occlusion.kind
+        head = n_inputs, c.occlusion_width, HEAD_LAYERS, config.occlusion.channels, config.occlusion.directional
+        self.occlusion = OcclusionHead(*head) if kind == "mlp" else None
+        self.cells = SkyCells(c.occlusion_directions) if kind == "bits" else None
+        self.bits: VisibilityBits | None = None
+        self.has_mesh = False
         self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.constants.initial_variance))
 
@@ -192,8 +186,36 @@ class SceneModel(nn.Module):
 
     def evaluate_light(self) -> EvaluatedLight:
         """The evaluated light, valid until its parameters move."""
-        maps = self.light.evaluate()
-        return EvaluatedLight(maps, self.occlusion.cell_light(maps) if self.config.shading.method == "summed" else None)
+        light = self.light.evaluate()
+        return light.with_cells(self.cells.light(light)) if self.config.shading.method == "summed" else light
+
+    @property
+    def is_unoccluded(self) -> bool:
+        """Whether the mesh blocks so little that it counts as convex."""
+        return self.bits is not None and self.bits.is_unoccluded
+
+    def occlusion_at(
+        self,
+        inputs: list[Tensor],
+        positions: Tensor,
+        normals: Tensor,
+        lobe_dirs: Tensor,
+        roughness: Tensor,
+        segments: RaySegments | None = None,
+    ) -> Occlusion:
+        """The occlusion factors at points [n, 3] of the surface; no gradient flows into the geometry.
+
+        Args:
+            inputs: See :meth:`head_inputs`.
+            positions, normals, lobe_dirs, roughness: See :class:`splitnerf.fields.VisibilityBits`.
+            segments: The ray segments of the points; cached visibility is looked up once for each. None: for every point.
+        """
+        if self.bits is not None and not self.bits.is_unoccluded:
+            return self.bits(positions, normals, lobe_dirs, roughness, segments)
+        if self.occlusion is not None and self.has_mesh:
+            return self.occlusion(inputs, lobe_dirs, roughness)
+        ones = torch.ones_like(roughness).expand(-1, self.config.occlusion.channels)
+        return Occlusion(ones, ones)
 
     def shade(
         self,
@@ -223,7 +245,7 @@ class SceneModel(nn.Module):
         asked = light_queries(normals, view_dirs, roughness, c.shading.query)
         lobe_dirs, facing = asked[0].chunk(2)
         surface = on_surface(positions, normals, outputs[:, 0])
-        occlusion = self.occlusion(OcclusionQuery(inputs, surface, facing, lobe_dirs, roughness), segments)
+        occlusion = self.occlusion_at(inputs, surface, facing, lobe_dirs, roughness, segments)
         shaded = split_sum_shade(
             normals,
             view_dirs,
@@ -282,7 +304,7 @@ class SceneModel(nn.Module):
 
         Source: SplitNeRF Eq. (4)-(6), by quadrature.
         """
-        middle, half = self.occlusion.summed_from, 0.5 * SUMMED_BAND
+        middle, half = self.cells.summed_from, 0.5 * SUMMED_BAND
         at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
         of_points = [
             points.normals,
@@ -297,8 +319,7 @@ class SceneModel(nn.Module):
         normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = (
             x.index_select(0, at) for x in of_points
         )
-        visible, sent = self.occlusion.visibility(on_surface, facing)
-        cells = light.cells
+        visible, sent = self.bits.visibility(on_surface, facing)
         return at, summed_correction(
             normals,
             view_dirs,
@@ -307,9 +328,9 @@ class SceneModel(nn.Module):
             metallic,
             split,
             share,
-            cells.directions,
-            cells.solid_angles,
-            cells.radiance,
+            self.bits.cache.directions,
+            light.cells.solid_angles,
+            light.cells.radiance,
             visible,
             sent,
             self.config.shading.compensate,
@@ -318,39 +339,94 @@ class SceneModel(nn.Module):
     def use_turns(self, turns: Tensor | None) -> None:
         """Averages the light of the cached occlusion over some of the photos' rotations [views, 3, 3] of it; None: it stands
         still."""
-        chosen = None if turns is None else turns[torch.linspace(0, len(turns) - 1, min(len(turns), TURNS)).long()]
-        self.occlusion.turns = chosen
+        if self.cells is not None and turns is not None:
+            self.cells.turns = turns[torch.linspace(0, len(turns) - 1, min(len(turns), TURNS)).long()]
 
     @property
     def sums_light(self) -> bool:
         """Whether :meth:`quadrature_correction` applies: with ``shading.method = summed``, from the first mesh on."""
-        return self.config.shading.method == "summed" and self.occlusion.ready
+        return self.config.shading.method == "summed" and self.has_mesh
 
     @torch.no_grad()
-    def use_mesh(self, traced: TracedBits | None) -> None:
-        """Switches the occlusion to a new mesh and computes a few bounces of indirect light on it.
+    def aims(self) -> Tensor | None:
+        """The directions [k, 3] in which a mesh would be traced for the present light; None where none is traced."""
+        return None if self.cells is None else self.cells.aims(self.light.evaluate())
 
-        Args:
-            traced: The result of :meth:`splitnerf.fields.OcclusionModel.trace` for the mesh.
-        """
-        self.occlusion.use(traced)
-        light = self.evaluate_light()
-        self.occlusion.set_light(light)
-        for _ in range(START_BOUNCES):
-            self.refresh_indirect(light)
+    def trace(self, scene: MeshScene, vertices: Tensor, faces: Tensor, aims: Tensor | None) -> VisibilityBits | None:
+        """The visibility of a mesh in directions of :meth:`aims`, on the CPU; None where none is cached. Another thread may
+        call it."""
+        c = self.config
+        if aims is None:
+            return None
+        return VisibilityBits.trace(
+            scene,
+            vertices,
+            faces,
+            aims,
+            offset=c.constants.occlusion_offset,
+            n_channels=c.occlusion.channels,
+            indirect=c.occlusion.indirect,
+            open_below=c.constants.open_below,
+        )
+
+    def use_mesh(self, bits: VisibilityBits | None) -> None:
+        """Switches to the visibility of a new mesh, and computes a few bounces of indirect light on it."""
+        self.has_mesh = True
+        if bits is not None:
+            self.bits, light = bits.to(self.device), self.evaluate_light()
+            self.weigh_occlusion(light)
+            for _ in range(START_BOUNCES):
+                self.refresh_indirect(light)
+
+    @torch.no_grad()
+    def weigh_occlusion(self, light: EvaluatedLight) -> None:
+        """Takes over the light that weighs the cached occlusion factors."""
+        if self.bits is not None:
+            self.bits.light.copy_((light.cells or self.cells.light(light)).radiance)
+
+    def materials_at(self, positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Albedo [n, 3], roughness [n, 1] and metallic [n, 1] at positions [n, 3], scene units."""
+        field = self.surface(positions)
+        return self.material(*self.head_inputs(positions, field.outputs, field.features))
 
     @torch.no_grad()
     def refresh_indirect(self, light: EvaluatedLight) -> None:
-        """Shades the cached mesh again with the split sum, under the light and the mesh's radiance of the last
-        refresh."""
-        c = self.config.shading
+        """Shades the emitters of the mesh again, with the split sum. They receive the radiance of the refresh before, so
+        that each call adds a bounce.
 
-        def materials(positions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-            field = self.surface(positions)
-            return self.material(*self.head_inputs(positions, field.outputs, field.features))
-
-        def reflect(n: Tensor, view_dirs: Tensor, here: Sequence[Tensor], light_s: Tensor, light_d: Tensor) -> Tensor:
-            one = torch.ones_like(here[1])
-            return split_sum_shade(n, view_dirs, *here, light_s, light_d, one, one, c.fresnel, c.compensate)
-
-        self.occlusion.refresh(light, materials, reflect)
+        An emitter reflects towards the one direction that it is seen from. Its specular light is the environment's, or
+        that of the emitter that it sees in the mirror direction. Seen from behind it is black.
+        """
+        c, bits, chunk = self.config.shading, self.bits, SHADED_CHUNK[self.device.type]
+        if bits is None or bits.emitters is None or bits.is_unoccluded:
+            return
+        g = light if self.cells.turns is None else mean_over(light, self.cells.turns)
+        x, n = bits.cache.vertices, bits.cache.normals
+        materials = [torch.cat(parts) for parts in zip(*map(self.materials_at, x.split(chunk)))]
+        o_d, _, i_d, _ = cached_occlusion(bits.cache, x, n, n, materials[1], bits.light, bits.radiance)
+        diffuse = o_d * g(n, torch.ones_like(n[:, :1])) + (0.0 if i_d is None else i_d)
+        before = x.new_zeros(1, 3) if bits.radiance is None else F.pad(bits.radiance, (0, 0, 0, 1))
+        blur = lobe_roughness(4.0 * math.pi / len(bits.light)) ** 4  # a ray stands for all of its cell
+        parts = [x.new_zeros(0, 3)]
+        for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in bits.emitters)):
+            normals, views = n[vertices], -bits.cache.directions[directions]
+            albedo, roughness, metallic = (part[vertices] for part in materials)
+            lobes = light_queries(normals, views, roughness)[0][: len(views)]
+            sky = g(lobes, (roughness**4 + blur).sqrt().sqrt())
+            seen = before[mirrored.clamp(max=len(before) - 1)]
+            specular, one = torch.where(mirrored[:, None] < 0, sky, seen), torch.ones_like(roughness)
+            shaded = split_sum_shade(
+                normals,
+                views,
+                albedo,
+                roughness,
+                metallic,
+                specular,
+                diffuse[vertices],
+                one,
+                one,
+                c.fresnel,
+                c.compensate,
+            )
+            parts.append(shaded * facing)
+        bits.set_radiance(torch.cat(parts))

@@ -211,10 +211,11 @@ def _check_light(config: Config, content: dict) -> None:
     if content.get("environment") is not None:
         check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)
     has_mesh = content.get("mesh_vertices") is not None
-    if not isinstance(cached, dict) or cached.keys() != (CACHED_LIGHT if config.occlusion.kind == "bits" else set()):
+    expected = CACHED_LIGHT if has_mesh and config.occlusion.kind == "bits" else set()
+    if not isinstance(cached, dict) or cached.keys() != expected:
         raise ValueError("occlusion_light is missing or of another kind")
     if cached:
-        _check_bits(cached, config.constants.occlusion_directions, len(content["mesh_vertices"]) if has_mesh else 0)
+        _check_bits(cached, config.constants.occlusion_directions, len(content["mesh_vertices"]))
 
 
 def _check_bits(cached: dict, k: int, n_vertices: int) -> None:

@@ -18,7 +18,6 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import FoundSamples, RenderedRays
 from splitnerf.training.batches import Batch
 from splitnerf.training.exposure import BEGIN
-from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.schedule import has_shape_priors, light_moves, light_period
 from splitnerf.training.step import Capacity, PendingNumbers, Step, StepNumbers
@@ -81,10 +80,6 @@ class GpuStep(Step):
         self._with_kernels: set[Hashable] = set()  # keys of steps that were taken once
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device) if c.run.cuda_graphs else None
-        if c.occlusion.kind == "mlp":
-            # How often it draws depends on the CPU's speed: the training's own numbers must not.
-            own = torch.Generator(self.generator.device).manual_seed(c.run.seed)
-            self.late = LateOcclusion(model, own)
 
     def __call__(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
@@ -119,20 +114,16 @@ class GpuStep(Step):
     def running(self) -> Iterator[None]:
         """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that
         stream."""
+        if self._stream is None:
+            yield
+            return
+        outside = torch.cuda.current_stream(self.model.device)
+        self._stream.wait_stream(outside)
         try:
-            if self._stream is None:
+            with torch.cuda.stream(self._stream):
                 yield
-                return
-            outside = torch.cuda.current_stream(self.model.device)
-            self._stream.wait_stream(outside)
-            try:
-                with torch.cuda.stream(self._stream):
-                    yield
-            finally:
-                outside.wait_stream(self._stream)
         finally:
-            if self.late is not None:
-                self.late.close()
+            outside.wait_stream(self._stream)
 
     def gradients(
         self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
@@ -176,13 +167,13 @@ class GpuStep(Step):
             self.is_held(progress),
             has_shape_priors(c, progress),
             self.mesh.made_at,
-            model.occlusion.ready,
+            model.has_mesh,
         )
 
     def _recorded(self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight) -> Recorded:
         batch, found = tree_map(torch.clone, (batch, found))
         leaves = [leaf.detach().clone().requires_grad_() for leaf in light.leaves]
-        light = light.with_tensors(leaves, [x.clone() for x in light.constants])
+        light = light.with_leaves(leaves)
 
         def work() -> tuple[RenderedRays, Terms]:
             light.zero_grad()  # a replay adds the gradients of one step only
@@ -196,8 +187,8 @@ class GpuStep(Step):
         self, recorded: Recorded, batch: Batch, found: FoundSamples, light: EvaluatedLight
     ) -> tuple[RenderedRays, Terms]:
         self.capacity = recorded.capacity
-        old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves, *recorded.light.constants]
-        new = [*tree_leaves((batch, found)), *light.leaves, *light.constants]
+        old = [*tree_leaves((recorded.batch, recorded.found)), *recorded.light.leaves]
+        new = [*tree_leaves((batch, found)), *light.leaves]
         with torch.no_grad():
             for dtype in {x.dtype for x in new}:  # one launch for all tensors of a type
                 torch._foreach_copy_(

@@ -124,7 +124,7 @@ class Training(TrainingState):
         if self.first or step % c.constants.grid_every == 0:
             use_hull = progress < c.constants.hull_until
             self.update_grid(self.take_step.s, first=self.first, step=step, use_hull=use_hull)
-        if model.occlusion.needs_mesh and progress - self.mesh.asked_at >= c.mesh.every:
+        if c.occlusion.kind != "off" and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
             self.mesh.request(progress)
         self.mesh.poll(wait=c.run.deterministic)
@@ -136,7 +136,7 @@ class Training(TrainingState):
             if self.environment is None or step % ENVIRONMENT_EVERY == 0:
                 self.environment = model.light.panorama(c.constants.occlusion_environment_height)
         if step % ENVIRONMENT_EVERY == 0:
-            model.occlusion.set_light(self.light)
+            model.weigh_occlusion(self.light)
         if c.occlusion.indirect and step % c.constants.indirect_every == 0:
             model.refresh_indirect(self.light)
 
@@ -167,7 +167,7 @@ class Training(TrainingState):
             if numbers.n_rays == self.n_rays:  # else the newest count was chosen while this step was on its way
                 self.n_rays = next_ray_count(self.n_rays, numbers.counts.samples, self.config)
             self.seconds = time.monotonic() - self.started
-            others = {"is_unoccluded": self.model.occlusion.is_unoccluded, "skipped": self.take_step.skipped}
+            others = {"is_unoccluded": self.model.is_unoccluded, "skipped": self.take_step.skipped}
             due = self.log.take(numbers, self.seconds, self.progress, **others)
             if bar is not None:
                 bar.show(self.progress, self.log.text(numbers))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +97,6 @@ def loss_terms(
     step: int,
     progress: float,
     seen: SeenLight | None = None,
-    late: Callable[[RenderedRays, MeshScene, Tensor, int], Tensor | None] | None = None,
 ) -> Terms:
     """The terms of the loss by name; the colour's term comes first.
 
@@ -110,8 +108,6 @@ def loss_terms(
         generator: Random numbers for the losses' subsets.
         step, progress: The number of the step, and the training's progress in [0, 1].
         seen: The light that photos show around the object; None where they show none.
-        late: The occlusion's term from points that were traced beside the training, see
-            :meth:`splitnerf.training.late_occlusion.LateOcclusion.loss`; None: the step traces its own points.
 
     Source: SplitNeRF Eq. (3), (11), (18) and the losses below.
     """
@@ -151,12 +147,7 @@ def loss_terms(
         if seen is not None and w.seen_weight:
             terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
     if environment is not None:
-        if late is None:
-            found = occlusion_loss(ray, scene, environment, c, generator, step)
-        else:
-            found = late(ray, scene, environment, step)
-        if found is not None:
-            terms.add({"occlusion": w.occlusion_weight}, found)
+        terms.add({"occlusion": w.occlusion_weight}, occlusion_loss(ray, scene, environment, c, generator, step))
     return terms
 
 
@@ -275,7 +266,7 @@ class SeenLight:
 
         The cost is that of Student's t distribution: what stands near is not what the object sees in that direction.
         """
-        texels = light.maps.partition(SEEN_TEXELS, self._device)
+        texels = light.partition(SEEN_TEXELS, self._device)
         if self._target is None:
             radiance, known = (
                 torch.from_numpy(x) for x in seen_at(self._surroundings, texels.directions.cpu().numpy())
@@ -309,72 +300,36 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
     return quadratic_entropy(x)
 
 
-class OcclusionPoints(NamedTuple):
-    """Points whose occlusion factors are traced, without gradients.
-
-    Attributes:
-        on_surface: [m, 3] positions on the surface, scene units.
-        normals: [m, 3] unit normals of the field.
-        lobe_dirs: [m, 3] unit axes of the specular lobe: the query direction of the specular light or, without
-            ``occlusion.directional``, the normal, as published.
-        roughness: [m, 1] perceptual roughness in [0, 1].
-    """
-
-    on_surface: Tensor
-    normals: Tensor
-    lobe_dirs: Tensor
-    roughness: Tensor
-
-
 def occlusion_loss(
     ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
+    Rays start at the samples, moved on to the surface, and are traced on the CPU; a GPU waits for them. Without
+    ``occlusion.directional`` the specular lobe's axis is the normal, as published.
+
     Source: SplitNeRF Eq. (12)-(16).
     """
-    random = torch.rand(len(ray.shaded), generator=generator, device=generator.device)
-    chosen = (random < config.constants.occlusion_share).nonzero().squeeze(1)
+    c, share = config, config.constants.occlusion_share
+    chosen = (torch.rand(len(ray.shaded), generator=generator, device=generator.device) < share).nonzero().squeeze(1)
     if len(chosen) == 0:
         return ray.shares.new_zeros(())
-    truth = traced_factors(scene, occlusion_points(ray, chosen, config), environment, config, seed)
     predicted = ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]
-    return occlusion_error(predicted, truth, ray.shares[chosen], config)
-
-
-@torch.no_grad()
-def occlusion_points(ray: RenderedRays, chosen: Tensor, config: Config) -> OcclusionPoints:
-    """The points of chosen [m] int64 shaded samples, moved onto the surface."""
-    normals = ray.normals[chosen]
-    on_surface = ray.positions[chosen] - normals * ray.sdf[chosen, None]
-    lobe_dirs = ray.points.lobe_dirs[chosen] if config.occlusion.directional else normals
-    return OcclusionPoints(on_surface, normals, lobe_dirs, ray.points.roughness[chosen])
-
-
-@torch.no_grad()
-def traced_factors(
-    scene: MeshScene, points: OcclusionPoints, environment: Tensor, config: Config, seed: int
-) -> tuple[Tensor, Tensor]:
-    """The factors o_d and o_s of points, see :func:`splitnerf.ops.occlusion_factors`."""
-    n_rays, offset = config.constants.occlusion_rays, config.constants.occlusion_offset
-    return occlusion_factors(
-        scene,
-        *points,
-        environment,
-        n_diffuse_rays=n_rays,
-        n_specular_rays=n_rays,
-        offset=offset,
-        seed=seed,
-        n_channels=config.occlusion.channels,
-    )
-
-
-def occlusion_error(
-    predicted: tuple[Tensor, Tensor], truth: tuple[Tensor, Tensor], shares: Tensor, config: Config
-) -> Tensor:
-    """The mean error of predicted factors o_d and o_s, [m, channels] each, weighted by the samples' shares [m].
-
-    Source: SplitNeRF Eq. (16).
-    """
-    error_d, error_s = ((ours - traced).square() for ours, traced in zip(predicted, truth))
-    return shares @ (error_d + error_s).sum(1) / (shares.sum().clamp(min=1e-8) * config.occlusion.channels)
+    with torch.no_grad():
+        normals, n_rays = ray.normals[chosen], c.constants.occlusion_rays
+        traced = occlusion_factors(
+            scene,
+            ray.positions[chosen] - normals * ray.sdf[chosen, None],
+            normals,
+            ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
+            ray.points.roughness[chosen],
+            environment,
+            n_diffuse_rays=n_rays,
+            n_specular_rays=n_rays,
+            offset=c.constants.occlusion_offset,
+            seed=seed,
+            n_channels=c.occlusion.channels,
+        )
+    error_d, error_s = ((ours - truth).square() for ours, truth in zip(predicted, traced))
+    shares = ray.shares[chosen]
+    return shares @ (error_d + error_s).sum(1) / (shares.sum().clamp(min=1e-8) * c.occlusion.channels)

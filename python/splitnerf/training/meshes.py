@@ -11,7 +11,7 @@ from torch import Tensor
 
 from splitnerf.devices import SideStream, in_background
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.fields.visibility import TracedBits
+from splitnerf.fields import VisibilityBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
 
@@ -28,7 +28,7 @@ class TracedMesh(NamedTuple):
     scene: MeshScene
     vertices: Tensor
     faces: Tensor
-    bits: TracedBits | None
+    bits: VisibilityBits | None
 
 
 class SurfaceMesh:
@@ -66,15 +66,13 @@ class SurfaceMesh:
         """
         if self._made is not None:
             return
-        self.asked_at, network = progress, self.model.sdf_field.network()
-        with torch.no_grad():
-            self.model.occlusion.aim(self.model.evaluate_light())
+        self.asked_at, network, aims = progress, self.model.sdf_field.network(), self.model.aims()
         if not self.background:
-            self._use(make_mesh(self.model, network))
+            self._use(make_mesh(self.model, network, aims))
             return
         network = network.snapshot()
         self._side.follow()
-        self._made = in_background(make_beside, self._side, self.model, network)
+        self._made = in_background(make_beside, self._side, self.model, network, aims)
 
     def poll(self, wait: bool = False) -> None:
         """Uses the mesh of the thread if it is ready; with ``wait``, waits for it.
@@ -91,14 +89,16 @@ class SurfaceMesh:
     def restore(self, content: dict) -> None:
         """Uses the mesh of a checkpoint, if it has one."""
         self.asked_at = content["meshed_at"]
-        stored = content["mesh_vertices"], content["mesh_faces"]
-        self.model.occlusion.restore_aims(content["occlusion_light"])
-        self._use(None if stored[0] is None else traced(self.model, *stored))
+        mesh, light = (content["mesh_vertices"], content["mesh_faces"]), content["occlusion_light"]
+        self._use(None if mesh[0] is None else traced(self.model, *mesh, light.get("aims")))
+        if light:
+            self.model.bits.restore(light)
 
-    def state(self) -> dict[str, Tensor | float | None]:
+    def state(self) -> dict[str, Tensor | float | dict | None]:
         """The part of the state that a checkpoint stores."""
         _, vertices, faces, _ = self.current or (None,) * 4
-        return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at}
+        light = {} if self.model.bits is None else self.model.bits.state()
+        return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at, "occlusion_light": light}
 
     def _use(self, mesh: TracedMesh | None) -> None:
         self.made_at = self.asked_at
@@ -107,8 +107,9 @@ class SurfaceMesh:
             self.model.use_mesh(mesh.bits)
 
 
-def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
-    """The zero level set of a field, traced; None where it is empty. Only constants of the model are read.
+def make_mesh(model: SceneModel, network: SdfNetwork, aims: Tensor | None) -> TracedMesh | None:
+    """The zero level set of a field, traced in directions `aims` [k, 3]; None where it is empty. Only constants of the model
+    are read.
 
     Raises:
         RuntimeError: The field is not finite.
@@ -117,20 +118,20 @@ def make_mesh(model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
         vertices, faces = extract_mesh(distances(network), model.config.constants.box, model.config.mesh.resolution)
     except EmptyMesh:
         return None
-    return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces))
+    return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces), aims)
 
 
-def make_beside(side: SideStream, model: SceneModel, network: SdfNetwork) -> TracedMesh | None:
+def make_beside(side: SideStream, model: SceneModel, network: SdfNetwork, aims: Tensor | None) -> TracedMesh | None:
     """The result of :func:`make_mesh` in the order of another stream, its bits on the model's device."""
     with side.within():
-        mesh = make_mesh(model, network)
+        mesh = make_mesh(model, network, aims)
         return mesh if mesh is None or mesh.bits is None else mesh._replace(bits=mesh.bits.to(model.device))
 
 
-def traced(model: SceneModel, vertices: Tensor, faces: Tensor) -> TracedMesh:
-    """A mesh with the visibility that the model's occlusion caches for it."""
+def traced(model: SceneModel, vertices: Tensor, faces: Tensor, aims: Tensor | None) -> TracedMesh:
+    """A mesh with its visibility in directions `aims`, where the model caches that."""
     scene = MeshScene(vertices.numpy(), faces.numpy())
-    return TracedMesh(scene, vertices, faces, model.occlusion.trace(scene, vertices, faces))
+    return TracedMesh(scene, vertices, faces, model.trace(scene, vertices, faces, aims))
 
 
 def distances(network: SdfNetwork) -> Callable[[Tensor], Tensor]:

@@ -142,7 +142,6 @@ class TrainingState:
                 cells=self.grid.cells,
                 environment=self.environment,
                 light_noise=self.model.light.loss_samples.state(),
-                occlusion_light=self.model.occlusion.cached_light(),
                 box_from_world=torch.from_numpy(self.dataset.box_from_world),
                 start=None if held is None else held.state(),
                 cameras=Cameras.of(self.dataset)._asdict(),
@@ -175,7 +174,5 @@ class TrainingState:
             self.take_step.start = StartShape(box=self.config.constants.box, **tensors)
         self.model.open_levels(self.progress)
         self.mesh.restore(content)
-        if content["occlusion_light"]:
-            self.model.occlusion.restore_light(content["occlusion_light"])
         self.first, self.resumed_at = self.step == 0, self.step
         self.started, self.saved_at = time.monotonic() - self.seconds, self.seconds

@@ -23,7 +23,6 @@ from splitnerf.training import losses
 from splitnerf.training.batches import Batch
 from splitnerf.training.exposure import BEGIN, PhotoExposures
 from splitnerf.training.finite import Diverged
-from splitnerf.training.late_occlusion import LateOcclusion
 from splitnerf.training.losses import Terms
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import cosine_anneal, has_shape_priors, light_moves
@@ -139,14 +138,12 @@ class Step:
         skipped: The number of steps whose gradients could not be used.
         newest: The rays of the last step, and their rendering.
         s: The sharpness as far as it is known without waiting.
-        late: Traces occlusion beside the training; None: each step traces its own points.
     """
 
     start: StartShape | None = None
     turns: Tensor | None = None
     newest: tuple[Batch, RenderedRays] | None = None
     s: float | None = None
-    late: LateOcclusion | None = None
 
     def __init__(
         self,
@@ -278,17 +275,7 @@ class Step:
             self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity, turns=turns
         )
         terms = losses.loss_terms(
-            self.model,
-            light,
-            batch,
-            ray,
-            self.mesh.scene,
-            environment,
-            self.generator,
-            step,
-            progress,
-            self.seen,
-            None if self.late is None else self.late.loss,
+            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
         )
         if self.is_held(progress):
             terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))

@@ -8,9 +8,7 @@ import numpy as np
 import torch
 import trimesh
 from splitnerf.config import preset
-from splitnerf.fields.light import EvaluatedLight
-from splitnerf.fields.occlusion import OcclusionQuery
-from splitnerf.fields.visibility import VisibilityBits
+from splitnerf.fields import Light, SkyCells, VisibilityBits
 from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe
 from torch import Tensor
 from torch.nn import functional as F
@@ -29,7 +27,7 @@ SOURCES = (
     "cpp/*scene*",
     "python/splitnerf/ops/occlusion.py",
     "python/splitnerf/ops/visibility.py",
-    "python/splitnerf/fields/visibility.py",
+    "python/splitnerf/fields/occlusion.py",
 )
 LARGE = 500  # columns and rows of the mesh of 500k triangles
 
@@ -109,11 +107,11 @@ def error_charts(light_name: str, points: SurfacePoints, quick: bool, rounds: in
         calls["lattice rays", f"n = {n}"] = lambda n=n: points.traced(n, n, seed=7)
         calls["independent rays", f"n = {n}"] = lambda n=n: independent(points, n)
     for n in (256,) if quick else (64, 128, 256, 512, 1024):
-        bits = VisibilityBits(n, OFFSET, 3, indirect=False)
-        bits.use(bits.trace(points.scene, points.vertices, points.faces))
-        bits.set_light(EvaluatedLight(EnvironmentOf(points.light)))
+        cells, mesh = SkyCells(n), (points.scene, points.vertices, points.faces)
+        bits = VisibilityBits.trace(*mesh, cells.centres, offset=OFFSET, n_channels=3, indirect=False)
+        bits.light = cells.light(EnvironmentOf(points.light)).radiance
         calls["bits", f"k = {n}"] = lambda bits=bits: bits(
-            OcclusionQuery(None, points.positions, points.normals, points.axes, points.roughness)
+            points.positions, points.normals, points.axes, points.roughness
         )[:2]
     with torch.no_grad():
         errors = {key: [rms(a - b) for a, b in zip(call(), true)] for key, call in calls.items()}
@@ -135,15 +133,14 @@ def error_charts(light_name: str, points: SurfacePoints, quick: bool, rounds: in
     ]
 
 
-class EnvironmentOf:
+class EnvironmentOf(Light):
     """A map as the light that weighs the visibility bits."""
 
-    leaves: tuple[Tensor, ...] = ()
-
     def __init__(self, light: MapLight):
+        super().__init__()
         self.light = light
 
-    def __call__(self, directions: Tensor, roughness: Tensor) -> Tensor:
+    def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
         alpha2 = roughness[:, 0] ** 4
         return self.light.filtered(directions, 4 * np.pi * alpha2)
 

@@ -102,8 +102,8 @@ def headline(evaluation: dict) -> dict[str, float]:
 def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> list[dict]:
     """g(w, rho) and its Monte Carlo estimate from g(w, 0), as [height, 2 height, 3] maps."""
     sources = fibonacci_directions(n_samples, torch.Generator(model.device).manual_seed(0))
-    maps = model.light.evaluate()
-    light = torch.cat([maps(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
+    evaluated = model.light.evaluate()
+    light = torch.cat([evaluated(d, torch.zeros_like(d[:, :1])) for d in sources.split(1 << 15)])
     queries = panorama_directions(height, model.device).reshape(-1, 3)
     panels = []
     for roughness in ROUGHNESS:
