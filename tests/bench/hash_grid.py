@@ -15,7 +15,7 @@ from torch import Tensor
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
 TOLERANCE = 1e-3  # difference between ours and plain torch, relative to the largest value
-SOURCES = ("cpp/*hash*", "python/splitnerf/ops/hash_grid.py")
+SOURCES = ("cpp/*hash*", "python/splitnerf/ops/sdf.py")
 
 
 def run(quick: bool, rounds: int) -> Result:

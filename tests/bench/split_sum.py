@@ -39,7 +39,6 @@ SOURCES = (
     "cpp/*brdf_lut*",
     "cpp/*monte_carlo*",
     "python/splitnerf/ops/shading.py",
-    "python/splitnerf/ops/monte_carlo.py",
 )
 NOISE = "noise"
 KARIS = "Karis 2014, fit"

@@ -10,7 +10,7 @@ import torch
 from op_cases import HASH_SPEC
 from op_checks import check_error, devices, generator, lib
 from splitnerf.ops import AdamW, HashGrid
-from splitnerf.ops.hash_grid import rounded
+from splitnerf.ops.sdf import rounded
 from splitnerf.training.checkpoint import restore_optimiser
 
 SHAPES = [(), (7,), (1000, 2), (37, 1), (5, 300), (3, 2, 4), (0, 2)]
@@ -142,7 +142,7 @@ def test_grids_take_the_copies_that_the_step_wrote(sparse, monkeypatch):
     x, first = torch.rand(5, 3, generator=generator()), [grid.stored() for grid in grids]
     before = [copied.clone() for copied in first]
     with monkeypatch.context() as patch:
-        patch.setattr("splitnerf.ops.hash_grid.rounded", None)
+        patch.setattr("splitnerf.ops.sdf.rounded", None)
         for _ in range(3):
             optimiser.zero_grad()
             sum(grid(x).square().sum() for grid in grids).backward()

@@ -12,7 +12,7 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.devices import same_bits
-from splitnerf.ops.hash_grid import rounded
+from splitnerf.ops.sdf import rounded
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import train as train_scene
 from tiny_runs import SMALL, as_options, contents, lines_of, tiny, train

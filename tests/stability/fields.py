@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import torch
 from splitnerf import ops
-from splitnerf.ops.hash_grid import rounded
+from splitnerf.ops.sdf import rounded
 
 from stability.cases import Draw
 from stability.entry import Entry, Rows

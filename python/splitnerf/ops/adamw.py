@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.ops._library import lib
-from splitnerf.ops.hash_grid import TableCopy
+from splitnerf.ops.sdf import TableCopy
 
 
 class AdamW(torch.optim.Optimizer):

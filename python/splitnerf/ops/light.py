@@ -1,12 +1,17 @@
-"""The Monte Carlo estimate of the pre-integrated light.
+"""The pre-integrated light: its Monte Carlo estimate, and the explicit light's linear maps, lookup and prior.
 
-Differentiable once in ``light``; a gradient to directions or roughness raises.
+Maps of the sphere are octahedral, +z in the centre of the square, texel (i, j) at row j n + i of an
+[n^2, 3] tensor; see ``cpp/include/splitnerf/octahedral.h``.
 
-Source: SplitNeRF Eq. (11).
+Source: SplitNeRF Eq. (11); Praun and Hoppe 2003 (the map); Ramamoorthi and Hanrahan 2001 (harmonics of the rough end).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -32,9 +37,6 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
 
     Returns:
         [s, 3] radiance; 0 for a query with no light direction above its horizon.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
     """
     return lib.prefilter_light(query_dirs, roughness, light_dirs, light)[0]
 
@@ -66,19 +68,16 @@ def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int =
 
     Returns:
         [s, n_samples, 3] unit directions.
-
-    Raises:
-        ValueError: A shape, dtype or count does not fit.
     """
     return lib.sample_ggx_lobe(axes, roughness, n_samples, seed)
 
 
-def _keep(ctx, inputs, output):
+def _keep_prefilter(ctx, inputs, output):
     query_dirs, roughness, light_dirs, _ = inputs
     ctx.save_for_backward(query_dirs, roughness, light_dirs, output[1])
 
 
-def _backward(ctx, grad_gbar, grad_total):
+def _prefilter_backward(ctx, grad_gbar, grad_total):
     query_dirs, roughness, light_dirs, total = ctx.saved_tensors
     refuse_gradients(ctx, "prefilter_light", query_dirs=0, roughness=1, light_dirs=2)
     return None, None, None, lib.prefilter_light_backward(query_dirs, roughness, total, grad_gbar, light_dirs)
@@ -90,11 +89,201 @@ register(
         query_dirs.new_empty(query_dirs.shape),
         query_dirs.new_empty(query_dirs.shape[0]),
     ),
-    setup_context=_keep,
-    backward=_backward,
+    setup_context=_keep_prefilter,
+    backward=_prefilter_backward,
 )
 register(
     "prefilter_light_backward",
     fake=lambda query_dirs, roughness, total, grad_gbar, light_dirs: light_dirs.new_empty(light_dirs.shape),
 )
 register("sample_ggx_lobe", fake=lambda axes, roughness, n_samples, seed: axes.new_empty(axes.shape[0], n_samples, 3))
+
+
+SH_COEFFICIENTS = 169  # degrees 0 to 12
+
+
+class SparseMap(NamedTuple):
+    """A sparse matrix by rows, and its transpose by rows for the backward pass.
+
+    Attributes:
+        offsets: [rows + 1] int64, the index of each row's first entry.
+        columns: [entries] int32 column indices.
+        weights: [entries] values.
+        transposed_offsets, transposed_columns, transposed_weights: The offsets, columns and weights of the transpose.
+    """
+
+    offsets: Tensor
+    columns: Tensor
+    weights: Tensor
+    transposed_offsets: Tensor
+    transposed_columns: Tensor
+    transposed_weights: Tensor
+
+
+def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> SparseMap:
+    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns)."""
+    n_columns = parts[0][3]
+    starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
+    offsets = np.concatenate([[0]] + [part[0][1:] + start for part, start in zip(parts, starts)])
+    columns = np.concatenate([part[1] for part in parts])
+    weights = np.concatenate([part[2] for part in parts])
+    rows = np.repeat(np.arange(len(offsets) - 1, dtype=np.int32), np.diff(offsets))
+    order = np.argsort(columns, kind="stable")
+    transposed_offsets = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=n_columns))])
+    return SparseMap(
+        torch.from_numpy(offsets.astype(np.int64)),
+        torch.from_numpy(columns),
+        torch.from_numpy(weights).to(dtype),
+        torch.from_numpy(transposed_offsets.astype(np.int64)),
+        torch.from_numpy(rows[order]),
+        torch.from_numpy(weights[order]).to(dtype),
+    )
+
+
+def light_sum_of_levels(resolution: int) -> SparseMap:
+    """The [n^2, 4^2 + 8^2 + ... + n^2] matrix that adds bilinearly interpolated levels of log-radiance, coarse to
+    fine."""
+    return sparse_map([_core.light_sum_of_levels(resolution)])
+
+
+def light_averages(resolution: int) -> SparseMap:
+    """The [n^2 + (n/2)^2 + ... + 8^2, n^2] matrix from texels to the texels and their averages by solid angle."""
+    return sparse_map([_core.light_averages(resolution)])
+
+
+def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMap:
+    """The matrix from the averages of :func:`light_averages` to gbar(w, rho) at the texel centres of octahedral maps.
+
+    Each row holds the integrals of ``D (w.w_s)+`` over cells, divided by their sum, so that a constant light is
+    preserved. Cells are larger where the lobe varies slowly. The lobe is not truncated.
+
+    Args:
+        resolution: Texels along an edge, n: a power of 2 >= 8.
+        targets: The resolution m and the roughness rho of each map, which has m^2 rows.
+
+    Source: SplitNeRF Eq. (11).
+    """
+    return sparse_map([_core.light_filter(resolution, m, rho) for m, rho in targets])
+
+
+def sh_projection(resolution: int, cells: bool) -> Tensor:
+    """The [169, n^2] float32 matrix from texels to spherical harmonics.
+
+    The light is bilinear between the texels' centres or, with ``cells``, constant in each texel.
+    """
+    return torch.from_numpy(_core.sh_projection(resolution, cells)).to(torch.float32)
+
+
+def zonal_factors(start: float, n_rows: int) -> Tensor:
+    """[n_rows, 13] float32 factors by which the lobe D cos scales each degree, for roughness ``start`` to 1."""
+    return torch.from_numpy(_core.zonal_factors(start, n_rows)).to(torch.float32)
+
+
+def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
+    """The product of a matrix with values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
+
+    Column indices are not checked: they come from the functions above.
+    """
+    return lib.sparse_product(*matrix, values)
+
+
+def light_lookup(
+    directions: Tensor, roughness: Tensor, levels: Tensor, sh: Tensor, resolutions: Tensor, nodes: Tensor, zonal: Tensor
+) -> Tensor:
+    r"""g(w, rho) from filtered maps and spherical harmonics.
+
+    Below ``nodes[0]`` g is the first map; between nodes g is linear in rho between their maps; from the last node on
+    :math:`g = \sum_{lm} zonal_l(\rho)\, sh_{lm}\, Y_{lm}(w)`. Maps are read bilinearly, also across the seams of the octahedron.
+    Spherical harmonics ring around strong lamps: where their sum x is below e, a thousandth of the mean light, it is
+    replaced by e exp(x/e - 1), and so is its gradient.
+
+    Differentiable once in directions (tangentially in the maps), roughness, levels and sh.
+
+    Args:
+        directions: [n, 3] unit directions w.
+        roughness: [n, 1] perceptual roughness; values above 1 count as 1.
+        levels: [sum of r_k^2, 3] radiance of the maps, one after the other.
+        sh: [169, 3] spherical harmonics of the radiance; the coefficient of (l, m) is in row l^2 + l + m.
+        resolutions: [K] int64 resolutions r_k of the maps; always on the CPU.
+        nodes: [K + 1] float64, ascending: the roughness of each map, then that of the harmonics; always on the CPU.
+        zonal: [rows, 13] factors of the degrees at roughness nodes[K] to 1, evenly spaced.
+
+    Returns:
+        [n, 3] radiance. A NaN direction or roughness gives NaN.
+    """
+    return lib.light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal)
+
+
+def _keep_map(ctx, inputs, output):
+    ctx.save_for_backward(*inputs[:6])
+
+
+def _map_backward(ctx, grad):
+    refuse_gradients(ctx, "sparse_product", weights=2, transposed_weights=5)
+    forward, transposed = ctx.saved_tensors[:3], ctx.saved_tensors[3:]
+    return *[None] * 6, lib.sparse_product(*transposed, *forward, grad)
+
+
+def _keep_lookup(ctx, inputs, output):
+    ctx.save_for_backward(*inputs)
+
+
+def _lookup_backward(ctx, grad):
+    refuse_gradients(ctx, "light_lookup", nodes=5, zonal=6)
+    return *lib.light_lookup_backward(*ctx.saved_tensors, grad), None, None, None
+
+
+register(
+    "sparse_product",
+    fake=lambda *inputs: inputs[6].new_empty(inputs[0].shape[0] - 1, 3),
+    setup_context=_keep_map,
+    backward=_map_backward,
+)
+register(
+    "light_lookup",
+    fake=lambda directions, *rest: directions.new_empty(directions.shape),
+    setup_context=_keep_lookup,
+    backward=_lookup_backward,
+)
+register("light_lookup_backward", fake=lambda *inputs: tuple(x.new_empty(x.shape) for x in inputs[:4]))
+
+
+def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
+    r"""How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
+
+    The mean over the coarsest level, the brightness of the whole light, costs nothing: it is taken from that level's texels. A
+    texel d then costs
+
+    .. math:: \ln\left(1 + \frac{b^2}{3 \cdot 0.5^2}\right) + \ln\left(1 + \frac{c}{3 \cdot 0.2^2}\right) ,
+
+    b the mean of its channels and c that of :math:`(d - b)^2`.
+
+    Args:
+        texels: [T, 3] log radiance beside the coarser levels, the coarsest level first, float32 or float64.
+        level_sizes: The numbers of texels of at most 16 levels; T in sum. The first should be small: each of its texels is
+            worked out from all of them.
+
+    Returns:
+        []. Differentiable in texels.
+
+    Source: our own; Student's t distribution with 3 degrees of freedom.
+    """
+    return lib.light_prior(texels, list(level_sizes))
+
+
+def _keep_texels(ctx, inputs, output):
+    texels, ctx.level_sizes = inputs
+    ctx.save_for_backward(texels)
+
+
+def _prior_backward(ctx, grad):
+    return lib.light_prior_backward(*ctx.saved_tensors, ctx.level_sizes, grad), None
+
+
+register(
+    "light_prior",
+    fake=lambda texels, level_sizes: texels.new_empty(()),
+    setup_context=_keep_texels,
+    backward=_prior_backward,
+)
+register("light_prior_backward", fake=lambda texels, level_sizes, grad_loss: texels.new_empty(texels.shape))

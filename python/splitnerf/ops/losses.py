@@ -42,9 +42,6 @@ def pixel_losses(
         [2]: colour, the mean over channels and pixels, and mask, the mean over pixels; 0 without pixels.
         Differentiable in mean and opacity.
 
-    Raises:
-        ValueError: A shape or dtype does not fit.
-
     Source: SplitNeRF Eq. (3); NeuS Eq. (17).
     """
     return lib.pixel_losses(mean, opacity, target, background, whole, exposure, linear)
@@ -68,9 +65,6 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tenso
         [2]: eikonal, the mean of :math:`(|g| - 1)^2`, and smoothness, the weighted mean distance of unit normals; 0 without
         points. Differentiable in the gradients.
 
-    Raises:
-        ValueError: A shape, dtype or index does not fit.
-
     Source: Gropp et al. 2020 (eikonal).
     """
     return lib.gradient_losses(gradients, weights, beside)[0]
@@ -86,9 +80,6 @@ def quadratic_entropy(x: Tensor) -> Tensor:
 
     Returns:
         [] entropy, from 0 (all points equal) to ln n. Differentiable in x.
-
-    Raises:
-        ValueError: A shape or dtype does not fit, or there is no point.
 
     Source: Renyi's quadratic entropy of a kernel density (Principe 2010, section 2.2), as Barron and Malik 2015 use it.
     """

@@ -1,18 +1,247 @@
-"""The distance field: in one pass with its gradient, its values alone, and the search for samples along rays.
+"""The distance field and its hash grid: encoding, the field with its gradient, its values alone, the search for samples along rays.
 
-``sdf_field`` is differentiable once in the table and the weights; ``sdf_values`` and ``sample_rays`` have no gradient.
+``hash_encode`` is differentiable once in positions and table, ``sdf_field`` once in the table and the weights; it has the gradient by
+the position as a result, so that a loss on it needs no second derivative. ``sdf_values`` and ``sample_rays`` have no gradient.
+
+The operators can read a 16-bit copy (``stored``) of a float32 table: lookups gather half the memory, all computation is
+in float32, and the table itself gets its gradient in float32. docs/ops.md lists the errors.
+
+Source: Mueller et al. 2022, section 3.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
+from torch.optim.optimizer import register_optimizer_step_post_hook
 
+from splitnerf import _core
 from splitnerf.ops._library import lib, refuse_gradients, register
-from splitnerf.ops.hash_grid import HashGridSpec, refuse_rounded_gradients
 from splitnerf.ops.rays import PackedSamples
+
+
+@dataclass(frozen=True)
+class HashGridSpec:
+    """Shape of a hash grid.
+
+    Attributes:
+        n_levels: The number of levels, 1 to 32.
+        n_features: The number of features per level: 1, 2, 4 or 8.
+        base_resolution: The number of cells along an edge of the coarsest level.
+        growth: The factor between the resolutions of neighbouring levels, at least 1.
+        log2_table_size: The base-2 logarithm of the largest number of entries per level; finer levels share their
+            entries by hashing.
+
+    Raises:
+        ValueError: A number is out of its range; the message names it.
+    """
+
+    n_levels: int = 16
+    n_features: int = 2
+    base_resolution: int = 32
+    growth: float = 1.3195079
+    log2_table_size: int = 19
+
+    def __post_init__(self):
+        self.levels()
+
+    def levels(self) -> list[tuple[int, int, int, bool]]:
+        """The tuple (resolution, first entry, number of entries, is dense) of each level."""
+        return _core.hash_grid_levels(
+            self.n_levels, self.n_features, self.base_resolution, self.growth, self.log2_table_size
+        )
+
+    @property
+    def n_entries(self) -> int:
+        """The number of rows of the table."""
+        _, offset, n, _ = self.levels()[-1]
+        return offset + n
+
+    @property
+    def n_outputs(self) -> int:
+        """The number of columns of the encoding."""
+        return self.n_levels * self.n_features
+
+    def arguments(self, n_active: int) -> tuple[int, int, float, int, int]:
+        """The trailing arguments of the ``torch.ops.splitnerf.hash_encode*`` operators."""
+        return self.n_levels, self.base_resolution, self.growth, self.log2_table_size, n_active
+
+
+def hash_encode(
+    positions: Tensor, table: Tensor, spec: HashGridSpec, n_active: int | None = None, stored: Tensor | None = None
+) -> Tensor:
+    """Encodes points of the unit cube by trilinear interpolation on every open level.
+
+    Args:
+        positions: [n, 3] points, float32 or float64, in [0, 1]. A point outside is moved to the nearest point of the
+            cube, and its gradient along the clamped axes is 0. A NaN coordinate gives NaN features.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16
+            or bfloat16 with float32 positions.
+        spec: The shape of the grid.
+        n_active: The number of open levels, coarsest first; the columns of closed levels are 0 and cost nothing.
+            Default: all.
+        stored: A copy of the float32 table in float16 or bfloat16, which is read instead of the table and converted to
+            float32; or None.
+
+    Returns:
+        [n, spec.n_outputs] features in the dtype of positions. Differentiable once in positions and table. The
+        gradient of table has the table's dtype and is summed in it; with `stored` the rounding counts as the identity.
+
+    Raises:
+        RuntimeError: `stored` or a 16-bit table requires a gradient; raised in the backward pass.
+    """
+    return lib.hash_encode(positions, table, *spec.arguments(spec.n_levels if n_active is None else n_active), stored)
+
+
+def rounded(table: Tensor, dtype: torch.dtype) -> Tensor:
+    """The table in 16 bits, rounded to nearest even.
+
+    A value beyond the largest number of the dtype (float16: 65504) becomes that number, never infinite. NaN stays NaN.
+    """
+    largest = torch.finfo(dtype).max
+    return table.detach().clamp(-largest, largest).to(dtype)
+
+
+_optimiser_steps = [0]  # steps of all optimisers of this process
+
+
+@register_optimizer_step_post_hook
+def _count_step(optimiser, *_) -> None:
+    if not getattr(optimiser, "counts_versions", False):
+        _optimiser_steps[0] += 1
+
+
+class TableCopy:
+    """A 16-bit copy of a float32 table. :func:`rounded` renews the copy when the table may have changed.
+
+    Two signs tell of a change: torch's version counter, and the step of any optimiser, since torch's fused optimisers
+    do not increase the counter. A write through ``table.data`` or by an optimiser's function without its class is not
+    noticed.
+
+    Args:
+        dtype: The dtype of the copy, torch.float16 or torch.bfloat16.
+    """
+
+    def __init__(self, dtype: torch.dtype):
+        if dtype not in (torch.float16, torch.bfloat16):
+            raise ValueError(f"table_dtype must be torch.float16 or torch.bfloat16, got {dtype}")
+        self.dtype = dtype
+        self._values: Tensor | None = None
+        self._of: tuple | None = None
+
+    def of(self, table: Tensor) -> Tensor:
+        """The current copy of the table, with its shape and on its device.
+
+        The copy is renewed in place: a backward pass through an older state of it raises RuntimeError.
+        """
+        if self._state(table) != self._of:
+            with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
+                values, kept = rounded(table, self.dtype), self._values
+                alike = kept is not None and (kept.shape, kept.device) == (values.shape, values.device)
+                self._values, self._of = kept.copy_(values) if alike else values, self._state(table)
+        return self._values
+
+    def was_written(self, table: Tensor) -> None:
+        """Declares the copy up to date after its values were written together with the table's."""
+        self._of = self._state(table)
+
+    @staticmethod
+    def _state(table: Tensor) -> tuple:
+        return table._version, _optimiser_steps[0], table.data_ptr(), table.device, table.shape
+
+
+class HashGrid(nn.Module):
+    """A hash grid with a learnable table.
+
+    Args:
+        spec: The shape of the grid.
+        init_scale: The bound of the table's first values, which are uniform in [-init_scale, init_scale].
+        table_dtype: The dtype of a copy that is read instead of the parameter, torch.float16 or torch.bfloat16; None
+            reads the parameter. The parameter and its gradient stay float32. The copy is renewed when the parameter has
+            changed and is not part of state_dict. Entries beyond the dtype's largest number (float16: 65504) are read
+            as that number.
+
+    Raises:
+        ValueError: table_dtype is another dtype.
+
+    Example:
+        >>> grid = HashGrid(HashGridSpec(n_levels=4, log2_table_size=12))
+        >>> grid(torch.rand(5, 3)).shape
+        torch.Size([5, 8])
+    """
+
+    def __init__(self, spec: HashGridSpec, init_scale: float = 1e-4, table_dtype: torch.dtype | None = None):
+        super().__init__()
+        self.spec = spec
+        self.copy = None if table_dtype is None else TableCopy(table_dtype)
+        self.n_active = spec.n_levels
+        self.table = nn.Parameter((torch.rand(spec.n_entries, spec.n_features) * 2 - 1) * init_scale)
+
+    def stored(self) -> Tensor | None:
+        """The table's current 16-bit copy; None without `table_dtype`."""
+        return None if self.copy is None else self.copy.of(self.table)
+
+    def forward(self, positions: Tensor) -> Tensor:
+        """Features [n, C] of positions [n, 3] in the unit cube; see :func:`hash_encode`."""
+        return hash_encode(positions, self.table, self.spec, self.n_active, self.stored())
+
+
+def _table_rows(grid: tuple) -> int:
+    n_levels, base_resolution, growth, log2_table_size, *_ = grid
+    return HashGridSpec(n_levels, 1, base_resolution, growth, log2_table_size).n_entries
+
+
+def _keep_encoded(ctx, inputs, output):
+    """Saves positions, table and, if given, the table's copy; the grid's numbers are between them in ``inputs``."""
+    positions, table, *grid, stored = inputs
+    ctx.save_for_backward(positions, table, *([] if stored is None else [stored]))
+    ctx.grid = grid
+
+
+def refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor], place: int = 7) -> None:
+    """Raises where a 16-bit tensor requires a gradient: autograd would round it, and small gradients would vanish.
+
+    The table is the operator's argument number 1, its copy number `place`.
+    """
+    if stored:
+        refuse_gradients(ctx, op, stored=place)
+    if ctx.needs_input_grad[1] and table.dtype in (torch.float16, torch.bfloat16):
+        raise RuntimeError(
+            f"{op}: no gradient to a table of {table.dtype} is defined; give it as stored, beside the float32 table"
+        )
+
+
+def _encode_backward(ctx, grad):
+    positions, table, *stored = ctx.saved_tensors
+    refuse_rounded_gradients(ctx, "hash_encode", table, stored)
+    grad_positions = grad_table = None
+    if ctx.needs_input_grad[0]:
+        grad_positions = lib.hash_encode_backward_positions(positions, *(stored or [table]), grad, *ctx.grid)
+    if ctx.needs_input_grad[1]:
+        grad_table = lib.hash_encode_backward(positions, grad, *ctx.grid)
+    return grad_positions, grad_table, *(None,) * 6
+
+
+register(
+    "hash_encode",
+    fake=lambda positions, table, *grid: positions.new_empty(positions.shape[0], grid[0] * table.shape[1]),
+    setup_context=_keep_encoded,
+    backward=_encode_backward,
+)
+register(
+    "hash_encode_backward",
+    fake=lambda positions, grad, *grid: grad.new_empty(_table_rows(grid), grad.shape[1] // grid[0]),
+)
+register("hash_encode_backward_positions", fake=lambda positions, *rest: positions.new_empty(positions.shape))
+
+
+def growth_for(base_resolution: int, finest_resolution: int, n_levels: int) -> float:
+    """The growth factor with which ``n_levels`` levels reach from the base to the finest resolution."""
+    return math.exp(math.log(finest_resolution / base_resolution) / max(1, n_levels - 1))
 
 
 class SdfNetwork(NamedTuple):
@@ -106,7 +335,6 @@ def sdf_field(
         lengths and biases; the backward pass evaluates the field again. With `stored` the gradient goes to the table.
 
     Raises:
-        ValueError: A shape, dtype, number or level count does not fit; the message names it.
         RuntimeError: positions, `stored` or a 16-bit table requires a gradient; raised in the backward pass.
 
     Source: SplitNeRF, section 4.1; weight normalisation: Salimans and Kingma 2016; grid: Mueller et al. 2022, section 3.
@@ -118,11 +346,7 @@ def sdf_field(
 
 
 def sdf_values(positions: Tensor, network: SdfNetwork) -> Tensor:
-    """Signed distances [n] at positions [n, 3], scene units: hash grid and network in one pass.
-
-    Raises:
-        ValueError: A shape, dtype or number does not fit.
-    """
+    """Signed distances [n] at positions [n, 3], scene units: hash grid and network in one pass."""
     return lib.sdf_values(positions, *network.arguments())
 
 
@@ -172,9 +396,6 @@ def sample_rays(
     Returns:
         The kept samples; [n_rays] int64, the number of distances per ray that the search asked for (on a GPU more are
         evaluated: a group of neighbours at once); and [] int64, the number of samples that were found.
-
-    Raises:
-        ValueError: A shape, dtype or number does not fit.
     """
     *samples, evaluated, found = lib.sample_rays(
         rays_o,

@@ -1,20 +1,130 @@
-"""Visibility bits cached on a mesh: occlusion factors and one bounce of light without tracing rays in a training step.
+"""Meshes that rays are traced in: occlusion factors, visibility bits cached on a mesh, and the light that arrives at an asset.
 
-The bits are traced on the CPU (:func:`splitnerf.ops.visibility_bits`, :meth:`splitnerf.ops.VisibilityCache.trace`); the
-lookups run on the device that :meth:`splitnerf.ops.VisibilityCache.to` copied them to.
+Rays are traced on the CPU. ``occlusion_factors`` copies tensors of another device there, and the results back; lookups of
+cached visibility run on the device that :meth:`VisibilityCache.to` copied it to.
 
 No operator here has a gradient; a backward pass raises.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from splitnerf import _core
 from splitnerf.ops._library import lib, register
-from splitnerf.ops.occlusion import MeshScene
+
+
+class MeshScene:
+    """A triangle mesh ready to be traced; the operators take its ``handle``.
+
+    The acceleration structure lives as long as the object. A changed mesh needs a new object.
+
+    Args:
+        vertices: [n, 3] float32, scene units.
+        faces: [m, 3] int32.
+
+    Raises:
+        ValueError: The mesh is empty, an index is out of range or a vertex is not finite.
+    """
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray):
+        self._scene = _core.Scene(
+            np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.int32)
+        )
+        self.handle: int = self._scene.handle
+
+    def trace_closest(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The nearest hits of rays.
+
+        Args:
+            origins, directions: [n, 3] float32.
+
+        Returns:
+            triangle [n] int64, -1 for a miss, and barycentric coordinates u, v [n] of its second and third corner.
+        """
+        return self._scene.trace_closest(origins, directions)[1:]
+
+    def is_open(self, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
+        """Whether each ray meets no triangle.
+
+        Args:
+            origins, directions: [n, 3] float32 on the CPU. Neighbours in the arrays should be neighbours in space, since
+                rays are traced in packets of 16.
+            t_far: The length of the rays in multiples of ``directions``.
+
+        Returns:
+            [n] bool, True where the ray is open.
+        """
+        rays = (x.contiguous().numpy() for x in (origins, directions))
+        return torch.from_numpy(self._scene.trace_visibility(*rays, t_far))
+
+
+def occlusion_factors(
+    scene: MeshScene,
+    positions: Tensor,
+    normals: Tensor,
+    lobe_dirs: Tensor,
+    roughness: Tensor,
+    environment: Tensor,
+    *,
+    n_diffuse_rays: int = 64,
+    n_specular_rays: int = 64,
+    offset: float = 0.0125,
+    along_ray: bool = False,
+    seed: int = 0,
+    n_channels: int = 1,
+) -> tuple[Tensor, Tensor]:
+    r"""The shares of the diffuse and of the specular light that reach points without meeting the mesh.
+
+    .. math:: o_d = \frac{\sum_i L_i V_i}{\sum_i L_i}
+
+    over cosine-weighted directions about the normal; o_s is the same ratio over directions of the lobe
+    :math:`D(w) (w \cdot d)^+` about ``lobe_dirs``. Each point is sampled, traced and summed by itself, so that
+    no [points, rays] array exists. Where the light is black, the factors are the shares of open directions.
+
+    Args:
+        scene: The mesh.
+        positions, normals: [n, 3] positions (scene units) and unit normals.
+        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.light_queries`).
+        roughness: [n, 1] perceptual roughness in [0, 1].
+        environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
+        n_diffuse_rays, n_specular_rays: The numbers of rays per point.
+        offset: The distance of a ray's start from its point, scene units.
+        along_ray: Whether the start is moved along the ray instead of along the normal.
+        seed: The seed of the random shift that each point's lattice of rays gets.
+        n_channels: 1 averages the factors over the colour channels, 3 keeps them.
+
+    Returns:
+        o_d and o_s, [n, n_channels] in [0, 1], 1 = open.
+
+    Source: SplitNeRF Eq. (14), (15), with the specular lobe about the reflection.
+    """
+    if n_channels not in (1, 3):
+        raise ValueError(f"occlusion_factors: n_channels must be 1 or 3, got {n_channels}")
+    o_d, o_s = lib.occlusion_factors(
+        scene.handle,
+        *(x.cpu() for x in (positions, normals, lobe_dirs, roughness, environment)),
+        n_diffuse_rays,
+        n_specular_rays,
+        offset,
+        along_ray,
+        seed,
+    )
+    o_d, o_s = o_d.to(positions.device), o_s.to(positions.device)
+    return (o_d, o_s) if n_channels == 3 else (o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True))
+
+
+register(
+    "occlusion_factors",
+    fake=lambda scene, positions, *rest: (positions.new_empty(positions.shape), positions.new_empty(positions.shape)),
+)
+
 
 GRID_LEVELS = 4  # levels of the search; the last has 8 times the radius of the first
 RADIUS_IN_SPACINGS = 1.5
@@ -43,10 +153,6 @@ def visibility_bits(
             row 1 the blocked ones. Directions below the vertex's own horizon are not traced and are marked in neither.
         hits: [n, k] int32, the vertex with the largest barycentric weight of the triangle that was hit, -1 where the
             direction is not blocked; [n, 0] without ``with_hits``.
-
-    Raises:
-        ValueError: A shape, dtype or count does not fit.
-        IndexError: The scene no longer exists.
     """
     return lib.visibility_bits(scene.handle, positions, normals, directions, offset, with_hits)
 
@@ -141,9 +247,6 @@ def cached_occlusion(
     Returns:
         o_d, o_s [n, 3] in [0, 1], 1 = open; i_d, i_s [n, 3] or None, in the normalisation of g (irradiance / pi).
 
-    Raises:
-        ValueError: A shape or dtype does not fit.
-
     Source: SplitNeRF Eq. (12)-(15) as sums over fixed directions.
     """
     hits = cache.hits if radiance is not None else cache.hits[:, :0]
@@ -179,9 +282,6 @@ def cached_visibility(
     Returns:
         visible: [n, k] open shares V_i in [0, 1]; 1 where no vertex counts.
         arriving: [n, k, 3] light (1 - V_i) C_i from the mesh, 0 below the horizon; None without ``radiance``.
-
-    Raises:
-        ValueError: A shape or dtype does not fit.
     """
     hits = cache.hits if radiance is not None else cache.hits[:, :0]
     visible, arriving = lib.cached_visibility(
@@ -227,3 +327,111 @@ register("visibility_bits", fake=_fake_bits)
 register("vertex_grids", fake=_fake_grids)
 register("cached_occlusion", fake=_fake_occlusion)
 register("cached_visibility", fake=_fake_visibility)
+
+
+class TexturedSurface(NamedTuple):
+    """The surface of a mesh with one material, as the path tracer reads it.
+
+    Attributes:
+        scene: The mesh.
+        normals, tangents, uv: [n_vertices, 3], [n_vertices, 4] and [n_vertices, 2] float32, see
+            ``splitnerf.data.asset.Asset``.
+        albedo_map: [h, w, 3] linear, in [0, 1].
+        roughness_metallic_map: [h, w, 2] in [0, 1].
+        normal_map: [h, w, 3] tangent-space normals.
+    """
+
+    scene: MeshScene
+    normals: Tensor
+    tangents: Tensor
+    uv: Tensor
+    albedo_map: Tensor
+    roughness_metallic_map: Tensor
+    normal_map: Tensor
+
+
+class IncomingLight(NamedTuple):
+    """Directions of n points and what comes from them.
+
+    Attributes:
+        directions: [n, k, 3] unit.
+        pdf: [n, k] density of all k directions together, sr^-1 (balance heuristic); 0 where a direction does not count.
+        visible: [n, k] 1 where the environment is seen, else 0.
+        sent: [n, k, 3] linear radiance that the asset sends from there.
+    """
+
+    directions: Tensor
+    pdf: Tensor
+    visible: Tensor
+    sent: Tensor
+
+
+def incoming_light(
+    surface: TexturedSurface,
+    environment: Tensor,
+    positions: Tensor,
+    geometric_normals: Tensor,
+    normals: Tensor,
+    view_dirs: Tensor,
+    albedo: Tensor,
+    roughness: Tensor,
+    metallic: Tensor,
+    *,
+    n_directions: int,
+    max_bounces: int = 3,
+    clamp_indirect: float = 0.0,
+    seed: int = 0,
+) -> IncomingLight:
+    """Draws directions for points of an asset, by the environment and by the material, and traces them. No gradient.
+
+    Args:
+        surface: The asset.
+        environment: [h, w, 3] linear radiance >= 0, equirectangular (z up, centre column along +x).
+        positions: [n, 3] points of the surface, scene units.
+        geometric_normals, normals: [n, 3] unit normals of the triangles and of the shading, on the viewer's side.
+        view_dirs: [n, 3] unit, towards the viewer.
+        albedo, roughness, metallic: [n, 3], [n, 1], [n, 1] in [0, 1].
+        n_directions: The number k of directions per point, at least 2.
+        max_bounces: The largest number of scattering events of the light that the asset itself sends.
+        clamp_indirect: The largest channel of one contribution to that light; 0 does not clamp.
+        seed: The seed of the random numbers; equal seeds give equal results.
+
+    Returns:
+        IncomingLight. The mean of f(direction) radiance / pdf over the k directions estimates the reflected light.
+
+    Source: Veach 1997 (multiple importance sampling); Heitz 2018 (visible normals).
+    """
+    directions, solid_angles, visible, sent = lib.incoming_light(
+        surface.scene.handle,
+        positions,
+        geometric_normals,
+        normals,
+        view_dirs,
+        albedo,
+        roughness,
+        metallic,
+        surface.normals,
+        surface.tangents,
+        surface.uv,
+        surface.albedo_map,
+        surface.roughness_metallic_map,
+        surface.normal_map,
+        environment,
+        n_directions,
+        max_bounces,
+        clamp_indirect,
+        seed,
+    )
+    pdf = torch.where(solid_angles > 0, 1.0 / (n_directions * solid_angles), 0.0)
+    return IncomingLight(directions, pdf, visible, sent)
+
+
+register(
+    "incoming_light",
+    fake=lambda scene, positions, *rest: (
+        positions.new_empty(len(positions), rest[-4], 3),
+        positions.new_empty(len(positions), rest[-4]),
+        positions.new_empty(len(positions), rest[-4]),
+        positions.new_empty(len(positions), rest[-4], 3),
+    ),
+)

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from splitnerf.config import Config
 from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensors
 from splitnerf.errors import InputError
-from splitnerf.ops.hash_grid import HashGridSpec
+from splitnerf.ops.sdf import HashGridSpec
 from splitnerf.render.model import N_FEATURES
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.seen import Cameras

@@ -25,7 +25,6 @@ SOURCES = (
     "cpp/*occlusion*",
     "cpp/*visibility*",
     "cpp/*scene*",
-    "python/splitnerf/ops/occlusion.py",
     "python/splitnerf/ops/visibility.py",
     "python/splitnerf/fields/occlusion.py",
 )

@@ -34,7 +34,6 @@ SOURCES = (
     "cpp/*prefilter*",
     "cpp/*light*",
     "python/splitnerf/ops/light.py",
-    "python/splitnerf/ops/light_pyramid.py",
     "python/splitnerf/fields/light.py",
 )
 NARROWEST = 0.1  # least roughness at which the harmonics are measured

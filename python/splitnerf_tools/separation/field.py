@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import torch
 from splitnerf.ops import HashGrid, HashGridSpec
-from splitnerf.ops.hash_grid import growth_for
+from splitnerf.ops.sdf import growth_for
 from torch import Tensor, nn
 from torch.nn import functional as F
 
