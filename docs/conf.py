@@ -19,7 +19,12 @@ html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
 extensions = [
-    "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_copybutton", "sphinxarg.ext",
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "sphinxarg.ext",
 ]
 nitpicky = True  # a name that leads nowhere is a warning; these belong to other programs
 nitpick_ignore_regex = [("py:.*", r"(torch|numpy|np|Tensor|collections)\b.*"), ("py:class", r".*\.TableCopy")]

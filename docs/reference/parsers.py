@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from splitnerf import cli
-from splitnerf.cli.help import TITLE, examples_in
+from splitnerf.cli.common import TITLE, examples_in
 
 
 def documented() -> argparse.ArgumentParser:

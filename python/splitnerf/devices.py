@@ -17,11 +17,8 @@ from splitnerf.errors import InputError
 
 
 def choose_device(name: str) -> torch.device:
-    """The device with this name, ``cpu`` or ``cuda``.
-
-    Raises:
-        InputError: The machine has no such device, or this build has no kernels for it.
-    """
+    """The device with this name, ``cpu`` or ``cuda``. Raises InputError where the machine has no such device, or this
+    build no kernels for it."""
     if name == "cpu":
         return torch.device("cpu")
     if not _core.cuda_architectures():
@@ -53,11 +50,8 @@ def covers(architectures: str, major: int, minor: int) -> bool:
 
 
 def fit_device(failing_operators: Callable[[str], tuple[list[str], int]] | None) -> tuple[str, str]:
-    """The GPU where all operators pass their test on it, else the CPU: ``cuda`` or ``cpu``, and why, in a clause.
-
-    Args:
-        failing_operators: The names of the operators that fail on a device, and how many were tested; None for no test.
-    """
+    """The GPU where all operators pass their test on it (see :class:`splitnerf.plugins.Plugin`; None: no test), else
+    the CPU: ``cuda`` or ``cpu``, and why, in a clause."""
     if not _core.cuda_architectures():
         return "cpu", "this build has no GPU kernels"
     if not torch.cuda.is_available():
@@ -75,12 +69,8 @@ def fit_device(failing_operators: Callable[[str], tuple[list[str], int]] | None)
 
 
 def refuse_one_processor() -> None:
-    """Refuses a machine with one processor, where xatlas 0.0.11 (texture coordinates) crashes: it allocates for one
-    thread and runs two.
-
-    Raises:
-        InputError: The machine has one processor.
-    """
+    """Raises InputError on a machine with one processor, where xatlas 0.0.11 (texture coordinates) crashes: it
+    allocates for one thread and runs two."""
     if os.cpu_count() == 1:
         raise InputError(
             "this machine has one processor, where xatlas 0.0.11 (texture coordinates) crashes; use one with two or more"
@@ -143,11 +133,8 @@ def spare_processors(device: torch.device) -> Iterator[None]:
 
 
 def start_fetching(x: Tensor) -> tuple[Tensor, Callable[[], None]]:
-    """Starts to copy a tensor to the CPU, in the order of its device's work.
-
-    Returns:
-        The copy, and a function that waits until it is complete; another thread may call it.
-    """
+    """Starts to copy a tensor to the CPU, in the order of its device's work; returns the copy, and a function that
+    waits until it is complete, which another thread may call."""
     copy = x.to("cpu", non_blocking=True)  # into pinned memory, where it comes from a GPU
     if x.device.type != "cuda":
         return copy, lambda: None
@@ -165,9 +152,6 @@ class SideStream:
     """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing.
 
     Neither thread waits for work of the other, except in the methods below; then the GPU waits, not the host.
-
-    Args:
-        device: The device of the work.
     """
 
     def __init__(self, device: torch.device):

@@ -1,6 +1,10 @@
-"""The errors that the command line turns into exit codes."""
+"""What the user is told: errors, which the command line turns into exit codes, and notes, which do not stop the work."""
 
 from __future__ import annotations
+
+import sys
+
+_said: set[str] = set()
 
 
 def plain(text: str) -> str:
@@ -25,3 +29,15 @@ class InputError(Exception):
 
 class CheckFailed(RuntimeError):
     """A benchmark's subject gives wrong results, so that its time is meaningless."""
+
+
+def note(text: str) -> None:
+    """Writes one line to stderr, which names a file and the values that were repaired or left out."""
+    print(f"splitnerf: note: {plain(text)}", file=sys.stderr)
+
+
+def note_once(text: str, example: str = "") -> None:
+    """Writes a note unless the same text was written before; the example, in brackets, may differ."""
+    if text not in _said:
+        _said.add(text)
+        note(f"{text} ({example})" if example else text)

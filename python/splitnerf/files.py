@@ -11,8 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.errors import InputError, note
 
 LOCK = "lock"  # the file in a folder that names the program that writes there
 PARTIAL = ".partial"  # part of the name of a file that is not yet whole
@@ -21,16 +20,11 @@ _locks: dict[Path, TextIO] = {}  # the locks of this program, by folder
 
 @contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary name in the folder of `path` that replaces it when the block succeeds.
+    """Yields a temporary name of the same suffix in the folder of `path`, which is made, that replaces it when the
+    block succeeds.
 
-    On any error the temporary file is removed and the old file at `path` stays. The new file is synchronised
-    before it takes the name, so that a power failure leaves the old one or the new one.
-
-    Args:
-        path: The file to write; missing parent folders are made.
-
-    Yields:
-        A path in the same folder, with the same suffix.
+    On any error the temporary file is removed and the old file at `path` stays. The new file is synchronised before it
+    takes the name, so that a power failure leaves the old one or the new one.
 
     Raises:
         OSError: The file cannot be written; the message names it, not the temporary one.
@@ -66,13 +60,8 @@ def locked(folder: Path) -> Iterator[None]:
     """Locks a folder for this program within the block; the file `lock` in it names the program.
 
     The lock ends with the program, however that ends. The next program takes the folder over and removes half-written
-    files. A folder that the block leaves empty is removed, if it was not there before.
-
-    Args:
-        folder: The folder; made where it is missing. This program may have locked it already.
-
-    Raises:
-        InputError: Another program has locked the folder, or it cannot be made or written to.
+    files. A folder that the block leaves empty is removed, if it was not there before. This program may have locked it
+    already. Raises InputError where another program has locked the folder, or it cannot be made or written to.
     """
     key = folder.resolve()
     if key in _locks:

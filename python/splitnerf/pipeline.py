@@ -18,21 +18,19 @@ import trimesh
 
 from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
-from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, spread
+from splitnerf.data.dataset import EXPOSURES, Dataset, dataset_fingerprint, load_dataset, spread, write_exposures
 from splitnerf.data.environment import read_environment
-from splitnerf.data.exposures import EXPOSURES, write_exposures
 from splitnerf.data.frames import has_test_split, refuse_data, split_rule
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
 from splitnerf.devices import same_bits
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note, note_once
 from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.export.scene import Exported, write_assets
 from splitnerf.files import atomic_path, locked
-from splitnerf.notes import note, note_once
 from splitnerf.plugins import installed
 from splitnerf.refinement.fit import FitSettings
 from splitnerf.refinement.refine import (
@@ -61,12 +59,8 @@ VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path trac
 def load_splits(
     data: Path, downscale: int, reading: Reading = Reading(), *, masked: bool = True
 ) -> tuple[Dataset, Dataset | None]:
-    """The train split, and the test split or None where no view is held out; a note says what is. Photos without masks are
-    refused if `masked`.
-
-    Raises:
-        InputError: The data cannot be used.
-    """
+    """The train split, and the test split or None where no view is held out; a note says what is. Photos without masks
+    are refused if `masked`. Raises InputError where the data cannot be used."""
     test = load_dataset(data, "test", downscale, reading, masked=masked) if has_test_split(data, reading) else None
     train = load_dataset(data, "train", downscale, reading, masked=masked)
     held_out = "no view is" if test is None else f"{len(test)} are"
@@ -114,11 +108,8 @@ def reconstruct(
 
 
 def for_turntable(config: Config) -> Config:
-    """The settings with those that a light of another rotation in each photo needs.
-
-    Raises:
-        InputError: They hold an occlusion that knows one light alone.
-    """
+    """The settings with those that a light of another rotation in each photo needs. Raises InputError where they hold
+    an occlusion that knows one light alone."""
     if config.occlusion.kind == "mlp":
         raise InputError("photos of a turntable need occlusion.kind = bits or off; change --set or --preset")
     return config.replace({"shading.method": "split", "run.cuda_graphs": False})
@@ -167,15 +158,10 @@ def deliver(
     observer: Observer = NOBODY,
 ) -> dict | None:
     """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
-
     Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
 
     Args:
-        trained: The scene.
-        dataset, test: The train split, and the test split or None.
-        run: The run's folder.
         resume: Whether to continue the refinement, if the scene has not changed since it was interrupted.
-        observer: Learns which stage begins.
 
     Returns:
         The evaluation; None where the refinement was interrupted.
@@ -210,16 +196,12 @@ def deliver(
 
 
 def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observer: Observer) -> bool:
-    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained.
-
-    Photos or an asset that it cannot use leave it out, with a note; the run then delivers what training exported.
+    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained. Photos or an
+    asset that it cannot use leave it out, with a note; the run then delivers what training exported, as where it raises
+    RuntimeError for numbers that are no longer finite.
 
     Returns:
         False where it was interrupted.
-
-    Raises:
-        RuntimeError: Numbers are no longer finite; the run delivers what training exported.
-        OSError: A file cannot be written.
     """
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
@@ -254,17 +236,13 @@ def score_run(
     maps: dict[str, Path],
     spp: int,
 ) -> Evaluated:
-    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields. Where
-    the run learned exposures, each view gets one by its own image.
+    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields.
+    Where the run learned exposures, each view gets one by its own image.
 
     Args:
-        run: The run's folder.
-        model, grid: The trained scene.
-        views: The views.
         mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
         timings: Seconds by part, "training" at least; that of a refinement is added.
-        maps: Environment maps of relit views by name, which are rendered of mesh.glb.
-        spp: Paths a pixel.
+        maps: Environment maps of relit views by name, which are rendered of mesh.glb with `spp` paths a pixel.
     """
     asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
     free = (run / EXPOSURES).is_file()
@@ -283,11 +261,8 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
 
 
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
-    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself.
-
-    Raises:
-        InputError: There is no run, or its checkpoint cannot be read.
-    """
+    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself. Raises InputError where
+    there is no run, or its checkpoint cannot be read."""
     if not run.is_dir():
         raise InputError(f"{run}: no such run; train one with `splitnerf train DATA --out {run}`")
     content = load_checkpoint(run / "checkpoint.pt")
@@ -305,17 +280,9 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
 
 
 def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = None) -> Evaluated:
-    """Scores again what a run delivers, see :func:`score_run`, with relit views of its mesh.glb.
-
-    Args:
-        run: The run's folder; its meshes and environment do not change.
-        data: The dataset of the run.
-        protocol: The views and lights.
-        out: The json file for the scores; None writes evaluation.json and report.html in the run's folder.
-
-    Raises:
-        InputError: The run or the data cannot be used.
-    """
+    """Scores again what a run delivers, see :func:`score_run`, with relit views of its mesh.glb; its meshes and
+    environment do not change. The scores go to `out`, by default with a report.html into the run's folder. Raises
+    InputError where the run or the data cannot be used."""
     model, grid, content = load_run(run)
     dataset, test = load_splits(data, protocol.downscale, protocol.reading)
     own = replace(config_of(content).reading, separated=protocol.reading.separated)

@@ -15,17 +15,11 @@ from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, Protocol
 
-from splitnerf.notes import note
+from splitnerf.errors import note
 
 GROUP = "splitnerf.commands"
 BUNDLED = EntryPoint("tools", "splitnerf_tools.plugin:PLUGIN", GROUP)
-TITLES = (
-    "data",
-    "reconstruction",
-    "results",
-    "many runs",
-    "this installation",
-)  # the groups of `splitnerf --help`, in order
+TITLES = ("data", "reconstruction", "results", "many runs", "this installation")  # of `splitnerf --help`, in order
 
 
 class Command(Protocol):

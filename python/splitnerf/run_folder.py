@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from splitnerf.data.exposures import EXPOSURES
+from splitnerf.data.dataset import EXPOSURES
 from splitnerf.data.frames import refuse_data
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
@@ -16,28 +16,13 @@ from splitnerf.training.metrics import METRICS
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
-RUN_FILES = (
-    "config.toml",
-    "checkpoint.pt",
-    METRICS,
-    "mesh.ply",
-    "mesh.glb",
-    "environment.exr",
-    "environment.hdr",
-    "evaluation.json",
-    "report.html",
-    ORIGIN,
-    EXPOSURES,
-    *REFINEMENT_FILES,
-)
+RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
+RUN_FILES += (ORIGIN, EXPOSURES, *REFINEMENT_FILES)
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Checks that a run can be made here, and what stands where it is to be.
-
-    Raises:
-        InputError: The folder holds a run or a data set, the path is not a folder, or the machine has one processor.
-    """
+    """Checks that a run can be made here, and what stands where it is to be. Raises InputError where the folder holds a
+    run or a data set, the path is not a folder, or the machine has one processor."""
     refuse_one_processor()
     if run.exists() and not run.is_dir():
         raise InputError(f"{run}: is a file; give --out a folder")

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench.tubes import TAU, Field, Tube, assemble, lathe, ring, through  # noqa: E402

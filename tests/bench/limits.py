@@ -24,11 +24,16 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.data.truth import OPAQUE, ViewTruth, load_scene_truth, load_view_truths
 from splitnerf.evaluate import metrics
-from splitnerf.evaluate.asset import asset_predictions, environment_beside
-from splitnerf.evaluate.protocol import evaluate_maps
-from splitnerf.evaluate.relight import RelitViews, relight
-from splitnerf.evaluate.scoring import Protocol, choose_views, relit_scores
-from splitnerf.evaluate.similarity import ScaledView, on_white, scaled_scores
+from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, on_white, scaled_scores
+from splitnerf.evaluate.scoring import (
+    Protocol,
+    RelitViews,
+    asset_predictions,
+    choose_views,
+    environment_beside,
+    relight,
+    relit_scores,
+)
 from splitnerf.relight.rendering import asset_of
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.provenance import header, provenance

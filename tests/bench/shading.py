@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import reference
 import torch
-from splitnerf.notes import note
+from splitnerf.errors import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients

@@ -12,10 +12,9 @@ from collections.abc import Collection
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
-from splitnerf.data.asset import Asset, Material
-from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export.bake import Spread, Texels, rasterise, to_tangent_space
-from splitnerf.export.unwrap import unwrap
+from splitnerf.data.asset import Asset, Material, vertex_tangents
+from splitnerf.export.bake import Texels, nearest_rows, rasterise, to_tangent_space
+from splitnerf.export.textured import unwrap
 
 MATERIALS = ("albedo", "roughness", "metallic")
 PARTS = (*MATERIALS, "normals")
@@ -127,7 +126,7 @@ class Canvas:
             mesh.tangents = vertex_tangents(mesh.vertices, mesh.triangles, mesh.normals, mesh.uv)
         self.mesh = mesh
         texels = rasterise(mesh.uv, mesh.triangles, size)
-        self._spread = Spread(texels.index, size)
+        self._nearest = nearest_rows(texels.index, size)
         self._frames = [texels.interpolate(values, mesh.triangles) for values in (mesh.normals, mesh.tangents)]
         nearest = NearestPoints(other)
         facing = unit(self._frames[0])
@@ -140,12 +139,12 @@ class Canvas:
     def painted(self, from_other: Collection[str]) -> Asset:
         """The mesh with its own values, but for those of `from_other`."""
         found = {part: (self.others if part in from_other else self.own)[part] for part in PARTS}
-        maps = {part: self._spread(np.clip(found[part], 0, 1)) for part in MATERIALS}
+        maps = {part: np.clip(found[part], 0, 1).astype(np.float32)[self._nearest] for part in MATERIALS}
         material = Material(
             metallic=1.0,
             albedo_texture=maps["albedo"],
             roughness_metallic_texture=np.dstack([maps["roughness"], maps["metallic"]]),
-            normal_texture=self._spread(to_tangent_space(found["normals"], *self._frames)),
+            normal_texture=to_tangent_space(found["normals"], *self._frames)[self._nearest],
         )
         return dataclasses.replace(self.mesh, materials=[material])
 

@@ -37,7 +37,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.data.layouts.transforms import read_camera_path
 from splitnerf.errors import InputError
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf.render.model import SceneModel
 from splitnerf.training.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
 from splitnerf.training.schedule import make_optimiser

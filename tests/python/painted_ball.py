@@ -9,12 +9,11 @@ import numpy as np
 import torch
 import trimesh
 from blender_data import look_at
-from splitnerf.data.asset import Asset, Material
+from splitnerf.data.asset import Asset, Material, vertex_tangents
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import linear_to_srgb
-from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export.unwrap import unwrap
+from splitnerf.export.textured import unwrap
 from splitnerf.refinement.texels import AssetTexels
 from splitnerf.render.path_traced import AssetRenderer
 

@@ -9,13 +9,12 @@ import trimesh
 from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from splitnerf.data.tangents import vertex_tangents
+from splitnerf.data.asset import Asset, vertex_tangents
 from splitnerf.export import surface
-from splitnerf.export.bake import UnwrappedMesh, bake_occlusion, rasterise
+from splitnerf.export.bake import bake_occlusion, rasterise
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
-from splitnerf.export.textured import textured_asset
-from splitnerf.export.unwrap import PADDING, unwrap
+from splitnerf.export.textured import PADDING, textured_asset, unwrap
 
 SIZE = 256
 SPACING = 3.0 / 79
@@ -200,7 +199,8 @@ def test_occlusion_beside_a_wall():
     faces = np.int32([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     normals = np.float32([[0, 0, 1]] * 4 + [[1, 0, 0]] * 4)
     uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]] + [[2, 2], [3, 2], [3, 3], [2, 3]])  # the wall off the texture
-    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+    tangents, ids = vertex_tangents(vertices, faces, normals, uv), np.zeros(len(faces), np.int32)
+    mesh = Asset("a", vertices, faces, normals, ids, uv=uv, tangents=tangents)
     occlusion = bake_occlusion(mesh, 128, 1e-3)
     d = (np.arange(128) + 0.5) / 64
     expected = 1 - 0.5 * (1 - d / np.sqrt(d**2 + 1))

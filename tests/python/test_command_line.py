@@ -9,8 +9,7 @@ import subprocess
 
 import pytest
 from splitnerf.cli import build_parser
-from splitnerf.cli.completion import SHELLS
-from splitnerf.cli.help import examples_in
+from splitnerf.cli.common import SHELLS, examples_in
 
 COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
 

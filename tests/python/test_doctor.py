@@ -15,11 +15,11 @@ from op_checks import has_cuda_kernel
 from pretend_gpu import pretend_gpu
 from splitnerf import _core, devices
 from splitnerf.cli import main
-from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED
+from splitnerf.cli.common import BAD_INPUT, DONE, FAILED
 from splitnerf.cli.train import device_for
 from splitnerf.devices import fit_device
 from splitnerf.errors import InputError
-from splitnerf.export.unwrap import unwrap
+from splitnerf.export.textured import unwrap
 from splitnerf_tools.doctor import machine, self_test
 from splitnerf_tools.plugin import failing_operators
 from torch.utils._python_dispatch import TorchDispatchMode

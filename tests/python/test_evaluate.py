@@ -10,12 +10,11 @@ import pytest
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import write_image
-from splitnerf.data.relit import map_files, read_relit, relight_maps
+from splitnerf.data.truth import map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
-from splitnerf.evaluate.relight import RelitViews, relight_scores
+from splitnerf.evaluate.protocol import ScaledView, scaled_scores
 from splitnerf.evaluate.score_table import evaluation_table
-from splitnerf.evaluate.scoring import Protocol, choose_views
-from splitnerf.evaluate.similarity import ScaledView, scaled_scores
+from splitnerf.evaluate.scoring import Protocol, RelitViews, choose_views, relight_scores
 
 SIZE = 16
 
@@ -182,7 +181,6 @@ def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
         (["RUN", "--lights", "low"], "--lights needs --data"),
         (["RUN", "RUN", "--data", "d", "--data", "d", "--data", "d"], "--data was given 3 times for 2 runs"),
         (["RUN", "RUN", "--data", "d", "--out", "x.json"], "--out takes one run, got 2"),
-        (["RUN", "--data", "d", "--sheet", "x.pdf"], "must end in .png or .jpg"),
         (["RUN", "--data", "d", "--env", "m.hdr"], "a run has its own light; leave --env out"),
         (["RUN/gone.glb", "--data", "d"], "gone.glb: no such file"),
     ],

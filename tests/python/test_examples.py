@@ -17,7 +17,7 @@ import trimesh
 from painted_ball import lamps, looking, orange
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf_tools.demo.scene import write_demo_dataset
 from tiny_runs import SMALL, as_options
 

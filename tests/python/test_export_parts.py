@@ -8,20 +8,25 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from splitnerf.data.asset import Asset, Material
-from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export import bake, maps
-from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
-from splitnerf.export.maps import encode_maps
+from splitnerf.data.asset import Asset, Material, vertex_tangents
+from splitnerf.export import bake, writers
+from splitnerf.export.bake import bake_occlusion
 from splitnerf.export.surface import Surface
 from splitnerf.export.textured import vertex_normals
+from splitnerf.export.writers import encode_maps
 
 
-def square() -> UnwrappedMesh:
+def unwrapped(vertices, faces, normals, uv) -> Asset:
+    """An asset to bake."""
+    ids, tangents = np.zeros(len(faces), np.int32), vertex_tangents(vertices, faces, normals, uv)
+    return Asset("a", vertices, faces, normals, ids, uv=uv, tangents=tangents)
+
+
+def square() -> Asset:
     """The unit square, z up, over the whole texture: x to the right, y down."""
     vertices = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces, normals, uv = np.int32([[0, 1, 2], [0, 2, 3]]), np.float32([[0, 0, 1]] * 4), vertices[:, :2].copy()
-    return UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+    return unwrapped(vertices, faces, normals, uv)
 
 
 def test_a_bake_in_bands_is_the_whole_one(monkeypatch):
@@ -29,25 +34,26 @@ def test_a_bake_in_bands_is_the_whole_one(monkeypatch):
     uv = np.float32([[0.1, 0.1], [0.6, 0.15], [0.2, 0.4], [0.3, 0.7], [0.9, 0.75], [0.8, 0.95]])
     vertices = np.column_stack([uv, np.zeros(6)]).astype(np.float32)
     faces, normals = np.int32([[0, 1, 2], [3, 4, 5]]), np.float32([[0, 0, 1]] * 6)
-    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
+    mesh = unwrapped(vertices, faces, normals, uv)
 
     def materials(x):
         return x.abs(), x[:, :1], x[:, 1:2], torch.nn.functional.normalize(torch.tensor([0.2, 0.1, 1.0]) + x, dim=1)
 
     floor = Surface(lambda x: x[:, 2], lambda x: (x[:, 2], torch.tensor([[0.0, 0.0, 1.0]]).expand_as(x)), materials)
     whole = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
-    assert whole.roughness_metallic[-1, -1] == pytest.approx([0.8, 0.95], abs=0.06)  # of the nearest corner
+    assert whole[0].roughness_metallic_texture[-1, -1] == pytest.approx([0.8, 0.95], abs=0.06)  # of the nearest corner
     monkeypatch.setattr(bake, "BAND", 64 * 7)
     parts = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
-    for name in ("albedo", "roughness_metallic", "occlusion", "normal"):
-        assert np.array_equal(getattr(whole, name), getattr(parts, name)), name
+    for name in ("albedo_texture", "roughness_metallic_texture", "normal_texture"):
+        assert np.array_equal(getattr(whole[0], name), getattr(parts[0], name)), name
+    assert np.array_equal(whole[1], parts[1])
 
 
 def test_maps_encoded_in_bands_are_the_whole_ones(monkeypatch):
     random = np.random.default_rng(0)
     gloss, open_share = random.random((30, 20, 2), np.float32), random.random((30, 20), np.float32)
-    monkeypatch.setattr(maps, "BAND", 20 * 7)
-    pixels = maps.encoded(lambda *bands: np.dstack(bands), open_share, gloss)
+    monkeypatch.setattr(writers, "BAND", 20 * 7)
+    pixels = writers.encoded(lambda *bands: np.dstack(bands), open_share, gloss)
     assert np.array_equal(pixels, np.rint(np.dstack([open_share, gloss]) * 255).astype(np.uint8))
 
 
@@ -104,12 +110,8 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
 
 
 def textured() -> Asset:
-    mesh = square()
-    texture = np.full((4, 4, 2), 0.25, np.float32)
-    material = Material("paint", roughness_metallic_texture=texture)
-    return Asset(
-        "square", mesh.vertices, mesh.faces, mesh.normals, np.zeros(2, np.int32), [material], mesh.uv, mesh.tangents
-    )
+    material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
+    return dataclasses.replace(square(), materials=[material])
 
 
 def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():

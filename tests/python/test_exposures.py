@@ -11,12 +11,11 @@ import pytest
 import torch
 from blender_data import edit, make_blender
 from splitnerf.cli import main
-from splitnerf.data.dataset import load_dataset
-from splitnerf.data.exposures import EXPOSURES, with_exposures
+from splitnerf.data.dataset import EXPOSURES, load_dataset, with_exposures
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
-from splitnerf.evaluate.exposure import exposed_like
+from splitnerf.evaluate.scoring import exposed_like
 from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
 from splitnerf.render.edges import EdgePixels
 from splitnerf.render.rays import DrawnRays

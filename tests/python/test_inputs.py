@@ -13,7 +13,7 @@ import OpenImageIO as oiio
 import pytest
 from blender_data import ANGLE, SIZE, edit, make_blender, write_exr
 from PIL import Image, ImageCms
-from splitnerf import notes
+from splitnerf import errors
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split
@@ -30,8 +30,7 @@ from splitnerf.data.images import (
 from splitnerf.data.layouts import colmap
 from splitnerf.data.layouts.frame import checked_pose, listed_file, listed_image
 from splitnerf.data.lens import lens_intrinsics, read_lens
-from splitnerf.data.masks import read_mask
-from splitnerf.data.photos import separated_mask
+from splitnerf.data.photos import read_mask, separated_mask
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.relight.background import read_plate
@@ -44,7 +43,7 @@ DISC = np.hypot(*np.mgrid[-4:5, -4:5]) < 3.5
 @pytest.fixture(autouse=True)
 def unsaid(monkeypatch):
     """No note was written yet."""
-    monkeypatch.setattr(notes, "_said", set())
+    monkeypatch.setattr(errors, "_said", set())
 
 
 def png(pixels: np.ndarray, mode: str | None = None) -> Image.Image:

@@ -21,7 +21,6 @@ CORE = [
     {"data"},
     {"ops", "devices", "files"},
     {"_core", "memory", "plugins", "progress"},
-    {"notes"},
     {"errors"},
 ]
 TOOLS = [

@@ -15,7 +15,7 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.evaluate.scoring import Protocol, evaluate_asset
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf_tools.synth.rendering import SynthSettings, synthesise
 
 SPP = 4

@@ -11,8 +11,8 @@ import pytest
 import torch
 from blender_data import make_blender
 from splitnerf.cli import main
-from splitnerf.cli.exit_codes import BAD_INPUT
-from splitnerf.data import loading, pixels
+from splitnerf.cli.common import BAD_INPUT
+from splitnerf.data import pixels
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.images import read_image
 from splitnerf.data.pixels import decoded, encoded, file_of
@@ -32,7 +32,7 @@ def in_file(monkeypatch, tmp_path):
     folder = tmp_path / "files"
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
-    monkeypatch.setattr(loading, "WORK", 1)
+    monkeypatch.setattr("splitnerf.data.photos.WORK", 1)
     return Reading(max_memory=5e-5), folder
 
 

@@ -10,8 +10,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
-from splitnerf.evaluate.protocol import evaluate_maps
-from splitnerf.evaluate.similarity import image_scores, mean_scores
+from splitnerf.evaluate.protocol import evaluate_maps, image_scores, mean_scores
 
 SIZE = 12
 PREDICTED, TRUE = np.zeros((2, SIZE, SIZE), bool)

@@ -18,7 +18,7 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import load_photo
 from splitnerf.data.reading import Reading
-from splitnerf.data.relit import map_files
+from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.evaluate.published import stanford_orb as orb_protocol

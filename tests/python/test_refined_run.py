@@ -16,14 +16,14 @@ import torch
 from painted_ball import sky, with_textures
 from splitnerf import pipeline, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
-from splitnerf.cli.summary import print_refinement
+from splitnerf.cli.common import print_refinement
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
 from splitnerf.data.tensor_files import read_tensors
 from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import Protocol, score_asset
-from splitnerf.export.environment import write_environment
-from splitnerf.export.glb import write_glb
+from splitnerf.export.scene import write_environment
+from splitnerf.export.writers import write_glb
 from splitnerf.refinement import refine as refinement_files
 from splitnerf.refinement import stage as stage_module
 from splitnerf.refinement.fit import FitSettings, Refinement

@@ -15,8 +15,8 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.errors import InputError
-from splitnerf.export.environment import write_environment
-from splitnerf.export.glb import write_glb
+from splitnerf.export.scene import write_environment
+from splitnerf.export.writers import write_glb
 from splitnerf.refinement import fit as fit_module
 from splitnerf.refinement.fit import FitSettings, Refinement, srgb_slope
 from splitnerf.refinement.outline import fit_outline

@@ -19,7 +19,7 @@ from painted_ball import with_textures
 from PIL import Image
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf_tools.report import write_report
 from splitnerf_tools.report.drawings import curve_data, line_chart
 from splitnerf_tools.report.embedding import data_uri, script_json

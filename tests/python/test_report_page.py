@@ -11,7 +11,7 @@ from looking_at import look_at, needs_chromium
 from painted_ball import sky, with_textures
 from PIL import Image
 from splitnerf.data.images import linear_to_srgb
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf_tools.report import write_report
 
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)

@@ -18,7 +18,7 @@ from PIL import Image
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
 from splitnerf.evaluate.metrics import psnr
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 
 ROOT = Path(__file__).parents[2]
 SIZE = 128

@@ -18,7 +18,7 @@ from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.environment import sample_environment, turn_environment
 from splitnerf.data.images import read_image, write_image
 from splitnerf.errors import InputError
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf.fields import LightPyramid, SkyCells
 from splitnerf.fields.light import mean_over
 from splitnerf.pipeline import load_run

@@ -15,7 +15,7 @@ from painted_ball import lamps, looking, with_textures
 from PIL import Image
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
-from splitnerf.export.glb import write_glb
+from splitnerf.export.writers import write_glb
 from splitnerf.relight.cameras import bounding_sphere, turntable
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos

@@ -12,9 +12,7 @@ from functools import partial
 
 import splitnerf
 from splitnerf.cli import evaluate, export, info, refine, relight, train
-from splitnerf.cli.completion import SHELLS, PrintCompletion
-from splitnerf.cli.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
-from splitnerf.cli.help import Help, ProgramHelp
+from splitnerf.cli.common import BAD_INPUT, DONE, FAILED, INTERRUPTED, SHELLS, Help, PrintCompletion, ProgramHelp
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason

@@ -5,14 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options, reading_of
-from splitnerf.cli.summary import print_scores
+from splitnerf.cli.common import DONE, add_reading_options, examples, print_scores, reading_of
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol", "truth")
-OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
+NEEDS_DATA = ("out", "views", "lights", "maps", "env", "protocol", "truth")
+OWN_RULES = ("lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
 SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
 
 
@@ -30,62 +27,50 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf evaluate runs/a --data hotdog --protocol nerfactor --maps lights",
         ),
     )
-    parser.add_argument("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
-    parser.add_argument(
+    add = parser.add_argument
+    add("targets", type=Path, nargs="+", metavar="RUN|FILE.glb")
+    add(
         "--data",
         type=Path,
         action="append",
         metavar="DATA",
         help="the data that RUN was trained on; once for all, or once for each RUN in order",
     )
-    parser.add_argument(
-        "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
-    )
+    add("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
     add_reading_options(parser, "as in training")
-    parser.add_argument(
-        "--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)"
-    )
-    parser.add_argument(
-        "--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)"
-    )
-    parser.add_argument(
+    add("--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)")
+    add("--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)")
+    add(
         "--lights",
         choices=["low", "high"],
         help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps",
     )
-    parser.add_argument(
+    add(
         "--protocol",
         choices=SETS,
         metavar="SET",
         help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
     )
-    parser.add_argument(
+    add(
         "--truth",
         type=Path,
         metavar="FOLDER",
         help="for --protocol stanford-orb: the set's ground_truth, if it is elsewhere",
     )
-    parser.add_argument(
+    add(
         "--maps",
         type=Path,
         metavar="FOLDER",
         help="folder of .hdr or .exr maps that DATA has relit images of (default: DATA's relight_*.hdr)",
     )
-    parser.add_argument(
+    add(
         "--env",
         type=Path,
         metavar="MAP",
         help="the light of the photos, for a GLB file (default: the environment.exr or .hdr in its folder)",
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched"
-    )
-    parser.add_argument(
-        "--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean"
-    )
-    parser.add_argument(
-        "--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error"
-    )
+    add("--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched")
+    add("--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean")
     parser.set_defaults(execute=run)
 
 
@@ -118,11 +103,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_usage(args: argparse.Namespace) -> None:
-    """Refuses options that exclude each other, and files of other kinds in the place of results.
-
-    Raises:
-        InputError: Two options exclude each other, or a file would be lost; the message names them.
-    """
+    """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
+    where two options exclude each other, or a file would be lost; the message names them."""
     from splitnerf.evaluate.published.scoring import holds_published
     from splitnerf.evaluate.score_table import holds_table
     from splitnerf.evaluate.scoring import holds_evaluation
@@ -144,11 +126,8 @@ def check_usage(args: argparse.Namespace) -> None:
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
         )
-    for name in ("out", "sheet"):
-        if getattr(args, name) is not None and len(args.targets) > 1:
-            raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
-    if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
-        raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
+    if args.out is not None and len(args.targets) > 1:
+        raise InputError(f"--out takes one run, got {len(args.targets)}; evaluate them one by one")
     holds = holds_published if args.protocol else holds_evaluation
     for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
@@ -169,12 +148,6 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
         raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
     else:
         evaluated = evaluate_run(target, data, protocol, args.out)
-    if args.sheet:
-        from splitnerf.evaluate.sheet import write_sheet
-
-        e = evaluated
-        write_sheet(args.sheet, e.dataset, e.predictions, e.truths, e.scores, e.relit)
-        print(f"sheet: {args.sheet}")
     return evaluated.scores
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
 MIN_FACES = 100

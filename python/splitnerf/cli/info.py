@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, examples
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:

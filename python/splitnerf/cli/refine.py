@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE, INTERRUPTED
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options, reading_of
+from splitnerf.cli.common import DONE, INTERRUPTED, add_reading_options, examples, reading_of
 from splitnerf.errors import InputError
 
 
@@ -22,19 +20,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "keeps the state there; --resume continues.",
         epilog=examples("splitnerf refine runs/data --data data --minutes 10"),
     )
-    parser.add_argument("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
-    parser.add_argument("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
-    parser.add_argument(
-        "--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)"
-    )
+    add = parser.add_argument
+    add("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
+    add("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
+    add("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
     add_reading_options(parser, "as in training")
-    parser.add_argument("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
-    parser.add_argument(
-        "--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)"
-    )
-    parser.add_argument("--resume", action="store_true", help="continue from the state that an interruption left")
-    parser.add_argument("--keep-shape", action="store_true", help="leave the vertices where they are")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
+    add("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
+    add("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
+    add("--resume", action="store_true", help="continue from the state that an interruption left")
+    add("--keep-shape", action="store_true", help="leave the vertices where they are")
+    add("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
     parser.set_defaults(execute=run)
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options, reading_of
+from splitnerf.cli.common import DONE, add_reading_options, examples, reading_of
 from splitnerf.errors import InputError
 
 
@@ -77,29 +76,14 @@ def run(args: argparse.Namespace) -> int:
         count = 1 if args.turntable is None else args.turntable
         return turntable(asset, count, elevation=args.elevation, rotate=args.rotate, size=size)
 
-    settings = Settings(
-        spp=args.spp,
-        bounces=args.bounces,
-        seed=args.seed,
-        rotate_env=args.rotate_env,
-        exposure=args.exposure,
-        background=args.background,
-        shadow_catcher=args.shadow_catcher,
-        gif=args.gif,
-        mp4=args.mp4,
-        fps=args.fps,
-    )
+    settings = Settings(**{known.name: getattr(args, known.name) for known in fields(Settings)})
     for folder in relight(args.source, args.env, views_of, args.out, settings, overwrite=args.overwrite):
         print(folder)
     return DONE
 
 
 def check_ranges(args: argparse.Namespace) -> None:
-    """Checks the ranges of numbers.
-
-    Raises:
-        InputError: A number is out of its range; the message names it.
-    """
+    """Raises InputError where a number is out of its range."""
     from splitnerf.render.path_traced import MOST_SPP
 
     limits = (

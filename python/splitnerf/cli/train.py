@@ -6,17 +6,21 @@ import argparse
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from splitnerf.cli.exit_codes import DONE, INTERRUPTED
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options, reading_options
-from splitnerf.cli.summary import print_scores, print_summary
+from splitnerf.cli.common import (
+    DONE,
+    INTERRUPTED,
+    add_reading_options,
+    examples,
+    print_scores,
+    print_summary,
+    reading_options,
+)
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
 
 if TYPE_CHECKING:
-    from splitnerf.config import Config
     from splitnerf.training.observer import Observer
 
 
@@ -35,16 +39,15 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "its step. The message names its origin; --resume continues from the last checkpoint.",
         ),
     )
-    parser.add_argument(
-        "data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for"
-    )
-    parser.add_argument("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
+    add = parser.add_argument
+    add("data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for")
+    add("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_alias(parser, "--output-dir", "--out")
     add_training_options(parser)
-    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    add("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     add_alias(parser, "--downscale-factor", "--downscale")
     add_reading_options(parser)
-    parser.add_argument(
+    add(
         "--resume",
         nargs="?",
         const=True,
@@ -52,13 +55,9 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="auto",
         help="continue the run in --out from its checkpoint; auto: begin where there is none, leave a finished run alone",
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
-    parser.add_argument(
-        "--view", nargs="?", const=0, type=port, metavar="PORT", help="show the run in a page while it trains"
-    )
-    parser.add_argument(
-        "--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too"
-    )
+    add("--overwrite", action="store_true", help="replace the run in --out")
+    add("--view", nargs="?", const=0, type=port, metavar="PORT", help="show the run in a page while it trains")
+    add("--tensorboard", type=Path, metavar="DIR", help="write the curves and previews for TensorBoard, too")
     parser.set_defaults(execute=run)
 
 
@@ -72,39 +71,41 @@ def port(text: str) -> int:
 def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
     """Accepts another program's name of an option, which the help does not list."""
     of = next(action for action in parser._actions if option in action.option_strings)
-    parser.add_argument(alias, dest=of.dest, type=of.type, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+    add = parser.add_argument
+    add(alias, dest=of.dest, type=of.type, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
 
 
 def add_training_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "--preset",
         choices=["cpu", "fast", "paper"],
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
-    parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
+    add("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
     add_alias(parser, "--max-num-iterations", "--steps")
     add_alias(parser, "--n_steps", "--steps")
-    parser.add_argument(
+    add(
         "--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it"
     )
-    parser.add_argument(
+    add(
         "--device",
         choices=["auto", "cpu", "cuda"],
         default="auto",
         help="where to train; auto: on the GPU if it passes the operators' test, else on the CPU (default: auto)",
     )
-    parser.add_argument("--seed", type=int, help="of all random numbers (default: 0)")
-    parser.add_argument(
+    add("--seed", type=int, help="of all random numbers (default: 0)")
+    add(
         "--deterministic",
         action="store_true",
         help="two runs with one seed give the same bits, on one machine with one number of threads",
     )
-    parser.add_argument(
+    add(
         "--no-refine",
         action="store_true",
         help="no refinement: deliver what training exports, and give training all minutes",
     )
-    parser.add_argument(
+    add(
         "--set",
         action="append",
         default=[],
@@ -160,28 +161,38 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
 def train_in(
     run: Path, args: argparse.Namespace, settings: dict[str, object], observers: Sequence[Observer] = ()
 ) -> int:
-    """Trains in a locked folder, calls the observers, prints the outcome and returns the exit code."""
+    """Trains in a locked folder, calls the observers, prints the outcome and returns the exit code. Raises InputError where the
+    options do not fit the existing run."""
+    from splitnerf.config import preset
     from splitnerf.devices import choose_device
     from splitnerf.evaluate.scoring import read_evaluation
     from splitnerf.pipeline import reconstruct
+    from splitnerf.run_folder import begin_or_resume, is_finished
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.training.observer import Event, together
 
-    plan = planned(run, args, settings)
-    if plan.is_finished:
-        together(observers)(Event("evaluation", path=run))
+    resume, overwrite = begin_or_resume(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
+    begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None
+    repeatable = (begun or preset("cpu")).replace(settings).run.deterministic
+    device = choose_device(device_for(args.device, repeatable))
+    base = begun or preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
+    if begun and args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
+        raise InputError("--preset cannot change in a run that is resumed")
+    config, observer = base.replace(settings), together(observers)
+    if args.resume == "auto" and config == base and is_finished(run):
+        observer(Event("evaluation", path=run))
         print(f"{run}: is finished")
         print_scores(read_evaluation(run))
         return DONE
-    device = choose_device(plan.device)
     trained, evaluation = reconstruct(
         args.data,
         run,
-        plan.config,
+        config,
         downscale=args.downscale,
         device=device,
-        resume=plan.resume,
-        overwrite=plan.overwrite,
-        observer=together(observers),
+        resume=resume,
+        overwrite=overwrite,
+        observer=observer,
     )
     if evaluation is None:
         where = "in the refinement" if trained.finished else f"at step {trained.step}"
@@ -191,50 +202,13 @@ def train_in(
     return DONE
 
 
-class Plan(NamedTuple):
-    """The plan of a command for its run's folder.
-
-    Attributes:
-        config: The settings.
-        device: The name of the device.
-        resume, overwrite: What to do with an existing run.
-        is_finished: Whether that run is finished.
-    """
-
-    config: Config
-    device: str
-    resume: bool
-    overwrite: bool
-    is_finished: bool
-
-
-def planned(run: Path, args: argparse.Namespace, settings: dict[str, object]) -> Plan:
-    """The plan of a command. Raises InputError where its options do not fit the existing run."""
-    from splitnerf.config import preset
-    from splitnerf.devices import choose_device
-    from splitnerf.run_folder import begin_or_resume, is_finished
-    from splitnerf.training.checkpoint import config_of, load_checkpoint
-
-    resume, overwrite = begin_or_resume(run) if args.resume == "auto" else (bool(args.resume), args.overwrite)
-    begun = config_of(load_checkpoint(run / "checkpoint.pt")) if resume else None
-    repeatable = (begun or preset("cpu")).replace(settings).run.deterministic
-    device = choose_device(device_for(args.device, repeatable))
-    base = begun or preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
-    if begun:
-        if args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
-            raise InputError("--preset cannot change in a run that is resumed")
-    config = base.replace(settings)
-    finished = args.resume == "auto" and config == base and is_finished(run)
-    return Plan(config, device.type, resume, overwrite, finished)
-
-
 def device_for(wanted: str, deterministic: bool) -> str:
     """The name of the requested device; for ``auto`` of a usable one, with a note on the reason where torch finds a
     GPU."""
     import torch
 
     from splitnerf.devices import fit_device
-    from splitnerf.notes import note
+    from splitnerf.errors import note
 
     if wanted != "auto":
         return wanted

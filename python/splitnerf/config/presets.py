@@ -109,11 +109,8 @@ def preset(name: str) -> Config:
 
 
 def parse_setting(text: str) -> tuple[str, object]:
-    """The name of a setting and its value from ``key=value`` with a TOML value; a bare word counts as a string.
-
-    Raises:
-        InputError: The text has another form.
-    """
+    """The name of a setting and its value from ``key=value`` with a TOML value; a bare word counts as a string. Raises
+    InputError where the text has another form."""
     key, separator, value = text.partition("=")
     if not separator or not key:
         raise InputError(f"--set takes key=value, got {text!r}")

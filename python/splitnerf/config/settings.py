@@ -30,11 +30,8 @@ SUMMED_DIRECTIONS = 256  # fewer do not resolve the lobes that `shading.method =
 
 @dataclass(frozen=True)
 class Config:
-    """Settings of one run, in groups. The defaults are the preset ``cpu``.
-
-    Raises:
-        InputError: A value is of another type or out of its range, or values exclude each other.
-    """
+    """Settings of one run, in groups. The defaults are the preset ``cpu``. Raises InputError where a value is of
+    another type or out of its range, or values exclude each other."""
 
     run: groups.RunSettings = groups.RunSettings()
     data: groups.DataSettings = groups.DataSettings()
@@ -180,6 +177,32 @@ RULES = (
         "more than one of constants.entropy_points; set run.cuda_graphs=false",
     ),
 )
+
+
+def settings_table(config: Config) -> str:
+    """Lines of ``group.name = value``, range or choices, unit and meaning, in columns, under their groups' titles."""
+
+    def shown(value: object) -> str:
+        return str(value).lower() if isinstance(value, bool) else str(value)
+
+    rows = {
+        name: (
+            f"{name} = {shown(config[name])}",
+            f"{known.metadata['limits']}".removeprefix("in "),
+            known.metadata["unit"],
+            known.metadata["meaning"],
+        )
+        for name, known in FIELDS.items()
+        if known.metadata["meaning"]
+    }
+    widths = [max(len(row[i]) for row in rows.values()) for i in range(3)]
+    lines = []
+    for group, kind in list(GROUPS.items())[:-1]:  # the last one is the record of the method
+        lines += ["", f"[{group}] {kind.__doc__.splitlines()[0]}"]
+        for name, row in rows.items():
+            if name.startswith(f"{group}."):
+                lines.append("  ".join([*(cell.ljust(width) for cell, width in zip(row, widths)), row[3]]))
+    return "\n".join(lines[1:])
 
 
 def _flat(settings: dict[str, object]) -> Iterator[tuple[str, object]]:

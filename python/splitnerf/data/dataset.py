@@ -14,23 +14,21 @@ import numpy as np
 from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
-from splitnerf.data.loading import Loader
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
-from splitnerf.data.photos import CERTAIN, Photo, silhouette_factor
+from splitnerf.data.photos import CERTAIN, Loader, Photo, silhouette_factor
 from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, new_array, room_for_photos
 from splitnerf.data.reading import Reading
-from splitnerf.errors import InputError
-from splitnerf.notes import note_once
+from splitnerf.errors import InputError, note_once
 from splitnerf.progress import tracked
 
 SURROUNDINGS = "surroundings.exr"
+EXPOSURES = "exposures.json"  # in a run: the exposures of photos that it learned
 JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
-MEAN_EDGE = (
-    1000  # pixels along the shorter edge of a photo, about, from which a fingerprint takes every other one, or fewer
-)
+MEAN_EDGE = 1000  # pixels along the shorter edge of a photo from which a fingerprint takes every other one, or fewer
 Average = Callable[[np.ndarray, int, "np.ndarray | None"], np.ndarray]  # see `Dataset.averaged`
 NEARLY_ALL, NEARLY_ALL_EDGE = 0.6, 0.5  # medians of what a mask keeps, and of the image's edge, if it is no object's
 
@@ -91,11 +89,9 @@ class Dataset:
 
     def __post_init__(self) -> None:
         self.images = self.images if isinstance(self.images, Photos) else Photos(self.images)
-        if self.sizes is None:
-            self.sizes = np.tile(self.images.shape[1:3], (len(self.images), 1))
-        self.exposures, self.stated = (
-            np.ones(len(self.images)) if x is None else x for x in (self.exposures, self.stated)
-        )
+        n, size = len(self.images), self.images.shape[1:3]
+        self.sizes = np.tile(size, (n, 1)) if self.sizes is None else self.sizes
+        self.exposures, self.stated = (np.ones(n) if x is None else x for x in (self.exposures, self.stated))
 
     def __len__(self) -> int:
         return len(self.images)
@@ -214,19 +210,14 @@ def load_dataset(
     *,
     masked: bool = True,
 ) -> Dataset:
-    """Loads one split of a posed image set.
+    """Loads one split, "train" or "test", of a posed image set in a folder of any layout.
 
     The normalisation is always estimated from the train split, so that train and test share a frame.
 
     Args:
-        root: Folder of any layout.
-        split: "train" or "test".
         downscale: Integer factor >= 1, averaged in premultiplied linear light.
         reading: What the data leave open.
         masked: Whether photos without masks are refused. Without masks the frame is that of what all cameras look at.
-
-    Returns:
-        The split as a `Dataset`.
 
     Raises:
         InputError: The folder, its files, an image, a mask or a pose cannot be used.
@@ -300,14 +291,8 @@ def _light_turns(frames: list[Frame]) -> np.ndarray | None:
 
 
 def dataset_fingerprint(dataset: Dataset) -> str:
-    """Hashes names, poses, sizes and mean colours, so that a run is not resumed on another scene.
-
-    Args:
-        dataset: A loaded split.
-
-    Returns:
-        16 hexadecimal digits, which depend on the folder's content, split and downscale but not on its path.
-    """
+    """Hashes names, poses, sizes and mean colours, so that a run is not resumed on another scene: 16 hexadecimal
+    digits, which depend on the folder's content, split and downscale but not on its path."""
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())
     shares = [] if dataset.known is None else [dataset.known.mean(axis=(1, 2))]
@@ -317,6 +302,34 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     for values in (dataset.poses, dataset.intrinsics, means, *shares):
         digest.update((np.round(values.astype(np.float64), 3) + 0.0).tobytes())
     return digest.hexdigest()[:16]
+
+
+def write_exposures(run: Path, dataset: Dataset) -> None:
+    """Writes the exposures of a split."""
+    meaning = "factors of each photo's linear red, green and blue, with the geometric mean of those that the data state"
+    factors = dict(zip(_names(dataset), np.round(dataset.exposures, 6).tolist()))
+    write_json(run / EXPOSURES, {"meaning": meaning, "exposures": factors})
+
+
+def _names(dataset: Dataset) -> list[str]:
+    """The images' paths in the data's folder."""
+    return [os.path.relpath(path, dataset.root) for path in dataset.image_paths]
+
+
+def with_exposures(dataset: Dataset, run: Path) -> Dataset:
+    """A split with the exposures that a run learned; as it is where it learned none. Raises InputError where the file
+    is damaged, or is of other photos."""
+    path = run / EXPOSURES
+    if not path.is_file():
+        return dataset
+    stored = read_json(path, "exposures")["exposures"]
+    try:
+        factors = np.array([stored[name] for name in _names(dataset)], np.float64)
+    except (KeyError, TypeError, ValueError):
+        factors = np.zeros(0)
+    if factors.shape != (len(dataset), 3) or not (np.isfinite(factors) & (factors > 0)).all():
+        raise InputError(f"{path}: is not of these photos; delete it to take the exposures that the data state")
+    return dataset.exposed(factors)
 
 
 def spread(items: Sequence, count: int) -> list:

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, read_radiance
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.errors import InputError, note
 
 ASPECT_TOLERANCE = 0.02
 BRIGHTEST = 1e12  # W / m^2 / sr; the sun has 1e7
@@ -23,14 +22,11 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
 
     Negative pixels that sum to at most a thousandth of the map are set to 0, with a note on stderr.
 
-    Args:
-        path: An EXR or HDR file, twice as wide as high.
-
     Returns:
         [h, w, 3] float32, finite and >= 0.
 
     Raises:
-        InputError: Not an HDR file, not 2:1, black, or with NaN, infinite or many negative pixels.
+        InputError: Not an EXR or HDR file, not 2:1, black, or with NaN, infinite or many negative pixels.
     """
     path = Path(path)
     if not path.is_file():
@@ -56,11 +52,8 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
 
 
 def read_surroundings(path: str | os.PathLike) -> np.ndarray:
-    """[h, 2 h, 4] float32: an equirectangular map of linear radiance with a fourth channel in [0, 1], how well it is known.
-
-    Raises:
-        InputError: The file is no such map.
-    """
+    """[h, 2 h, 4] float32: an equirectangular map of linear radiance with a fourth channel in [0, 1], how well it is
+    known. Raises InputError where the file is no such map."""
     image = read_image(path)
     good = image.ndim == 3 and image.shape[2] == 4 and image.shape[1] == 2 * image.shape[0]
     if not good or not np.isfinite(image).all() or image.min() < 0 or image[..., 3].max() > 1:
@@ -69,25 +62,10 @@ def read_surroundings(path: str | os.PathLike) -> np.ndarray:
 
 
 def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Radiance from directions, interpolated bilinearly.
-
-    Args:
-        radiance: [h, w, 3] equirectangular.
-        directions: [..., 3] directions, of any length above 0.
-
-    Returns:
-        [..., 3] float32.
-    """
-    height, width = radiance.shape[:2]
+    """Radiance [..., 3] float32 from directions [..., 3] of any length above 0, of a map [h, w, 3], interpolated
+    bilinearly."""
     x, y, z = np.moveaxis(directions, -1, 0)
-    column = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * width - 0.5
-    row = np.clip(np.arctan2(np.hypot(x, y), z) / np.pi * height - 0.5, 0, height - 1)
-    left, top = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), height - 2)
-    across, down = (column - left)[..., None], (row - top)[..., None]
-    rows = [
-        (1 - across) * radiance[top + k, left % width] + across * radiance[top + k, (left + 1) % width] for k in (0, 1)
-    ]
-    return ((1 - down) * rows[0] + down * rows[1]).astype(np.float32)
+    return _bilinear(radiance, np.arctan2(np.hypot(x, y), z) / np.pi, 0.5 - np.arctan2(y, x) / (2 * np.pi))
 
 
 def directions_of_texels(height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -108,15 +86,8 @@ def texels_of_directions(directions: np.ndarray, height: int) -> np.ndarray:
 
 
 def seen_at(surroundings: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What photos show around the object, in given directions.
-
-    Args:
-        surroundings: [h, 2 h, 4], see :func:`read_surroundings`.
-        directions: [n, 3].
-
-    Returns:
-        The radiance [n, 3], and how well it is known [n], in [0, 1]; the radiance is 0 where nothing is.
-    """
+    """What photos show around the object, see :func:`read_surroundings`, in directions [n, 3]: the radiance [n, 3], and
+    how well it is known [n], in [0, 1]; the radiance is 0 where nothing is."""
     share = surroundings[..., 3:]
     mean = sample_environment(np.concatenate([surroundings[..., :3] * share, share], axis=2), directions)
     known = mean[..., 3]
@@ -124,15 +95,8 @@ def seen_at(surroundings: np.ndarray, directions: np.ndarray) -> tuple[np.ndarra
 
 
 def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
-    """Turns the light about the z axis, counter-clockwise seen from above.
-
-    Args:
-        radiance: [h, w, 3] equirectangular.
-        degrees: The angle; columns are interpolated linearly, which keeps each row's mean.
-
-    Returns:
-        [h, w, 3], same dtype.
-    """
+    """Turns the light [h, w, 3] about the z axis by degrees, counter-clockwise seen from above; columns are
+    interpolated linearly, which keeps each row's mean."""
     shift = degrees / 360 * radiance.shape[1]
     whole = int(np.floor(shift))
     share = shift - whole
@@ -141,42 +105,33 @@ def rotate_environment(radiance: np.ndarray, degrees: float) -> np.ndarray:
 
 
 def turn_environment(radiance: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """The light of a map in another world.
-
-    Args:
-        radiance: [h, 2 h, 3] equirectangular.
-        turn: [3, 3] the rotation from that world to the map's.
-
-    Returns:
-        [h, 2 h, 3] float32; each texel is the mean of `FINER` x `FINER` samples.
-    """
+    """The light [h, 2 h, 3] float32 of a map [h, 2 h, 3] in another world; `turn` [3, 3] is the rotation from that
+    world to the map's. Each texel is the mean of `FINER` x `FINER` samples."""
     directions, _ = directions_of_texels(FINER * radiance.shape[0])
     return area_average(sample_environment(radiance, directions @ np.asarray(turn).T), FINER)
 
 
 def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Resizes an equirectangular map: whole blocks are averaged, the rest is bilinear, wrapping around in u.
-
-    Args:
-        image: [H, W, C].
-        height: Rows of the result.
-        width: Columns of the result.
-
-    Returns:
-        [height, width, C] float32.
-    """
+    """Resizes an equirectangular map [H, W, C] to [height, width, C] float32: whole blocks are averaged, the rest is
+    bilinear, wrapping around in u."""
     image = np.asarray(image, np.float32)
     factor = min(image.shape[0] // height, image.shape[1] // width)
     if factor > 1 and image.shape[0] % factor == 0 and image.shape[1] % factor == 0:
         image = area_average(image, factor)
-    rows, columns = image.shape[:2]
-    if (rows, columns) == (height, width):
+    if image.shape[:2] == (height, width):
         return image
-    y = np.clip((np.arange(height) + 0.5) * rows / height - 0.5, 0, rows - 1)
-    x = (np.arange(width) + 0.5) * columns / width - 0.5
-    y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
-    fy, fx = (y - y0)[:, None, None].astype(np.float32), (x - x0)[None, :, None].astype(np.float32)
-    y1, x1 = np.minimum(y0 + 1, rows - 1), (x0 + 1) % columns
-    upper = image[y0][:, x0] * (1 - fx) + image[y0][:, x1] * fx
-    lower = image[y1][:, x0] * (1 - fx) + image[y1][:, x1] * fx
-    return upper * (1 - fy) + lower * fy
+    v, u = (np.arange(height)[:, None] + 0.5) / height, (np.arange(width) + 0.5) / width
+    return _bilinear(image, *np.broadcast_arrays(v, u))
+
+
+def _bilinear(image: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """[..., C] float32, a map [h, w, C] between its texels, at v from the top and u [...] as shares of it; u wraps around."""
+    height, width = image.shape[:2]
+    row, column = np.clip(v * height - 0.5, 0, height - 1), u * width - 0.5
+    top, left = np.clip(np.floor(row).astype(int), 0, max(0, height - 2)), np.floor(column).astype(int)
+    down, across = (row - top)[..., None], (column - left)[..., None]
+    upper, lower = (
+        (1 - across) * image[y, left % width] + across * image[y, (left + 1) % width]
+        for y in (top, np.minimum(top + 1, height - 1))
+    )
+    return ((1 - down) * upper + down * lower).astype(np.float32)

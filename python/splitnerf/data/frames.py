@@ -21,21 +21,11 @@ FAR = 1e3  # distances between the cameras; farther from the origin, float32 los
 
 
 def read_frames(root: Path, split: str, reading: Reading = Reading()) -> tuple[list[Frame], np.ndarray]:
-    """The frames of one split, in the data's order, and the origin of their world.
-
-    Args:
-        root: Folder of any layout.
-        split: "train" or "test".
-        reading: What the data leave open.
-
-    Returns:
-        The frames, and the point [3] float64 of the data's own world that was subtracted from their positions: 0 but
-        where all cameras are so far from the origin that float32 would lose what their pixels show. It is the same for
-        both splits.
-
-    Raises:
-        InputError: No layout is recognised, the split has no frame, or a frame has no image, no usable pose or no lens.
-    """
+    """The frames of one split, "train" or "test", of a folder of any layout, in the data's order, and the origin of
+    their world: the point [3] float64 of the data's own world that was subtracted from their positions. It is 0 but
+    where all cameras are so far from the origin that float32 would lose what their pixels show, and the same for both
+    splits. Raises InputError where no layout is recognised, the split has no frame, or a frame has no image, no usable
+    pose or no lens."""
     layout = layout_of(root)
     if layout is None:
         raise InputError(
@@ -73,11 +63,6 @@ def refuse_data(folder: Path) -> None:
     """Raises InputError where a folder holds a data set: results would replace the truth beside the photos."""
     if layout_of(folder) is not None:
         raise InputError(f"{folder}: holds a data set, which results would replace; give another --out")
-
-
-def spread_views(frames: list[Frame], count: int) -> list[Frame]:
-    """At most `count` of the frames, evenly spread from the first one."""
-    return frames[:: max(1, len(frames) // count)][:count]
 
 
 def split_rule(root: Path, reading: Reading = Reading()) -> str:

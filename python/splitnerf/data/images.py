@@ -21,9 +21,8 @@ from PIL import Image, ImageCms
 from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path, is_file
-from splitnerf.notes import note_once
 
 JPEG_QUALITY = 95
 SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it
@@ -37,18 +36,11 @@ VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pi
 
 
 def read_image(path: str | os.PathLike) -> np.ndarray:
-    """Reads a PNG, JPEG, WebP, EXR or HDR image; the content decides the format.
+    """Reads a PNG, JPEG, WebP, EXR or HDR image as [H, W, C] float32, top row first; the content decides the format.
 
-    Alpha is kept as the file stores it: straight in PNG, associated in EXR.
-
-    Args:
-        path: The image file.
-
-    Returns:
-        [H, W, C] float32, top row first. 8- and 16-bit files in [0, 1], the others as stored.
-
-    Raises:
-        InputError: The file is missing, unreadable, truncated, of another format, or claims a size beyond reason.
+    8- and 16-bit files are in [0, 1], the others as stored. Alpha is kept as stored: straight in PNG, associated in
+    EXR. Raises InputError where the file is missing, unreadable, truncated, of another format, or claims a size beyond
+    reason.
     """
     return _read(Path(path), str(path))
 
@@ -137,18 +129,8 @@ def is_written_here(path: Path) -> bool:
 
 
 def decode_image(data: bytes, name: str) -> np.ndarray:
-    """Decodes an image file in memory: PNG, JPEG, WebP, EXR or HDR; the content decides the format.
-
-    Args:
-        data: The file's bytes.
-        name: The name of the file for messages.
-
-    Returns:
-        [H, W, C] float32, see `read_image`.
-
-    Raises:
-        InputError: The data are unreadable, truncated, of another format or too large.
-    """
+    """Decodes an image file in memory like :func:`read_image`; messages name it `name`. Raises InputError where the
+    data are unreadable, truncated, of another format or too large."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "image"
         path.write_bytes(data)
@@ -219,15 +201,8 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
-    """Averages blocks of factor x factor pixels; incomplete blocks at the bottom and right are cropped.
-
-    Args:
-        pixels: [H, W] or [H, W, C].
-        factor: At least 1, at most min(H, W).
-
-    Returns:
-        [H // factor, W // factor] or with C, same dtype.
-    """
+    """Averages blocks of factor x factor pixels of [H, W] or [H, W, C]; incomplete blocks at the bottom and right are
+    cropped. The factor is at most min(H, W)."""
     if factor == 1:
         return pixels
     height, width = pixels.shape[0] // factor, pixels.shape[1] // factor
@@ -236,17 +211,14 @@ def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
 
 
 def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0) -> np.ndarray:
-    """Composites a straight-alpha image over a grey background, in sRGB values as the protocol demands.
-
-    Args:
-        srgb: [..., 3] colours in [0, 1].
-        alpha: [...] coverage in [0, 1].
-        background: Grey level, 1 is white.
-
-    Returns:
-        [..., 3] colours.
-    """
+    """A straight-alpha image [..., 3] sRGB with coverage [...] over a grey background (1 is white), in sRGB values as
+    the protocol demands."""
     return srgb * alpha[..., None] + background * (1 - alpha[..., None])
+
+
+def straight_srgb(radiance: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """[..., 3] float32 straight sRGB colours in [0, 1] of linear premultiplied ones with coverage [...]; 0 where clear."""
+    return linear_to_srgb(np.clip(radiance / np.maximum(alpha, 1e-8)[..., None], 0, 1)).astype(np.float32)
 
 
 def _encode_ldr(pixels: np.ndarray, suffix: str) -> bytes:

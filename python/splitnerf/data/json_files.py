@@ -10,15 +10,8 @@ from splitnerf.files import atomic_path
 
 
 def read_json(path: Path, key: str) -> dict:
-    """Reads a file.
-
-    Args:
-        path: The file.
-        key: A key that the object must have; only the message uses it.
-
-    Raises:
-        InputError: The file is missing or cannot be read, is not valid json, or does not hold an object.
-    """
+    """Reads a file; messages name the `key` that its object must have. Raises InputError where the file is missing or
+    cannot be read, is not valid json, or does not hold an object."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; check the path")
     try:

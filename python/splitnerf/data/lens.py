@@ -14,17 +14,22 @@ from splitnerf.errors import InputError
 SMALLEST, LARGEST = 1e-6, 1e9  # bounds of a pinhole's numbers
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4"), ("p1", "p2")
 LARGEST_COEFFICIENT = 1e3
-MODELS = {
-    "SIMPLE_PINHOLE": False,
-    "PINHOLE": False,
-    "SIMPLE_RADIAL": False,
-    "RADIAL": False,
-    "OPENCV": False,
-    "OPENCV_FISHEYE": True,
-    "SIMPLE_RADIAL_FISHEYE": True,
-    "RADIAL_FISHEYE": True,
+PARAMETERS = {
+    "SIMPLE_PINHOLE": "fl_x cx cy",
+    "PINHOLE": "fl_x fl_y cx cy",
+    "SIMPLE_RADIAL": "fl_x cx cy k1",
+    "RADIAL": "fl_x cx cy k1 k2",
+    "OPENCV": "fl_x fl_y cx cy k1 k2 p1 p2",
+    "OPENCV_FISHEYE": "fl_x fl_y cx cy k1 k2 k3 k4",
+    "FULL_OPENCV": "",
+    "FOV": "",
+    "SIMPLE_RADIAL_FISHEYE": "fl_x cx cy k1",
+    "RADIAL_FISHEYE": "fl_x cx cy k1 k2",
+    "THIN_PRISM_FISHEYE": "",
+    "RAD_TAN_THIN_PRISM_FISHEYE": "",
 }
-"""The camera models that are read, by their usual names: whether the lens is a fisheye."""
+"""COLMAP's camera models in the order of its numbers, and their parameters by a transforms file's names; "" is not read."""
+MODELS = [name for name, parameters in PARAMETERS.items() if parameters]
 STRIP = 1 << 20  # pixels whose places in a photo are computed at once
 
 
@@ -113,7 +118,7 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
         if not valid or (key.startswith("camera_angle") and value >= np.pi):
             kind = "number" if placed else "positive number"
             raise InputError(f"{where}: '{key}' must be a {kind}, got {str(value)[:40]}; repair it")
-    fisheye = MODELS[model]
+    fisheye = "FISHEYE" in model
     radial, tangential = (tuple(float(coefficients[key]) for key in keys) for keys in (RADIAL, TANGENTIAL))
     if fisheye and any(tangential):
         raise InputError(f"{where}: a fisheye with 'p1' or 'p2' is not read; undistort the photos")
@@ -150,12 +155,8 @@ def lens_intrinsics(lens: dict, size: tuple[int, int]) -> np.ndarray:
 
 
 def undistort(planes: np.ndarray, distortion: Distortion, intrinsics: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The image that a pinhole with the same focal length, principal point and size takes.
-
-    Args:
-        planes: [H, W, C] float32, the photo.
-        distortion: The lens of the photo.
-        intrinsics: [4] (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
+    """The image that a pinhole with the same focal length, principal point and size takes, of a photo [H, W, C] float32
+    with a distortion, and intrinsics [4] (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
 
     Returns:
         [H, W, C] float32, which may leave the photo's range of values a little, and the pixels [H, W] bool that the
@@ -178,15 +179,11 @@ def undistort(planes: np.ndarray, distortion: Distortion, intrinsics: np.ndarray
 
 
 def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
-    """[h, w, C] values of a photo [1, C, H, W] between its pixels, by Keys' cubic convolution with a = -1/2, which is
-    exact for quadratic functions.
+    """[h, w, C] values of a photo [1, C, H, W] between its pixels at places [h, w, 2] float64 (x, y), 0 at the first
+    pixel's centre, by Keys' cubic convolution with a = -1/2, which is exact for quadratic functions.
 
     The kernel is linear in a. torch has it for a = -3/4, which is not even exact for linear functions. For a = 0 it is
     bilinear interpolation at the fraction t moved to 3 t^2 - 2 t^3. Two thirds and one third of these make a = -1/2.
-
-    Args:
-        photo: The photo.
-        places: [h, w, 2] float64 (x, y), 0 at the first pixel's centre.
     """
     size = torch.tensor([photo.shape[3], photo.shape[2]])
 
@@ -200,16 +197,11 @@ def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
 
 
 def pixel_width(poses: np.ndarray, intrinsics: np.ndarray, middle: np.ndarray, *, nearest: float = 0.0) -> float:
-    """The width of a pixel at a point, as a median over the photos.
+    """The width of a pixel at a point `middle` [3], in the unit of the poses, as a median over the photos.
 
     Args:
-        poses: [n, 4, 4] camera to world.
-        intrinsics: [n, 4] focal lengths and principal point in pixels.
-        middle: [3] the point, in the unit of the poses.
+        poses, intrinsics: [n, 4, 4] camera to world, and [n, 4] focal lengths and principal point in pixels.
         nearest: A distance; cameras that are nearer to the point count as that far from it.
-
-    Returns:
-        The width in the unit of the poses.
     """
     distance = np.maximum(np.linalg.norm(poses[:, :3, 3] - middle, axis=1), nearest)
     return float(np.median(distance / intrinsics[:, 0]))

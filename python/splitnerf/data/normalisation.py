@@ -33,19 +33,17 @@ def estimate_box(
     intrinsics: np.ndarray,
     known: Sequence[np.ndarray | None] | None = None,
 ) -> np.ndarray:
-    """Estimates the similarity from the data's world to the frame where the object fits the box [-1.5, 1.5]^3.
+    """The similarity [4, 4] float64 (uniform scale and translation) from the data's world to the frame where the object
+    fits the box [-1.5, 1.5]^3.
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
-    Where the hull's bounding sphere about the origin has a radius in (0.4, 1.4] the data's frame is kept.
+    Where the hull's bounding sphere about the origin has a radius in (0.4, 1.4] the data's frame is kept: the identity.
 
     Args:
         silhouettes: n arrays [H, W] bool, true on the object, each of its own size.
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4], (fx, fy, cx, cy) in pixels of `silhouettes`.
         known: n arrays [H, W] bool, the pixels that say something; None for all.
-
-    Returns:
-        [4, 4] float64, uniform scale and translation, or the identity.
 
     Raises:
         MasksContradict: No point of space projects into the masks.
@@ -73,15 +71,12 @@ def estimate_box(
 
 
 def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The similarity that brings the middle of what all cameras look at to the origin, with a radius of 1.
+    """The similarity [4, 4] float64 that brings the middle of what all cameras look at to the origin, with a radius of
+    1.
 
     Args:
-        poses: [n, 4, 4] camera-to-world, OpenGL axes.
-        intrinsics: [n, 4], (fx, fy, cx, cy) in pixels.
+        poses, intrinsics: See :func:`estimate_box`.
         sizes: [n, 2] height and width of the photos in pixels.
-
-    Returns:
-        [4, 4] float64, uniform scale and translation.
 
     Raises:
         ValueError: All cameras stand at one place.
@@ -139,16 +134,10 @@ def spread_of(directions: np.ndarray) -> float:
 
 
 def nearest_to_rays(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """The point with the least sum of squared distances to lines.
+    """The point [3] with the least sum of squared distances to lines through origins [n, 3] along directions [n, 3], of
+    any length but 0.
 
     It solves sum (I - d d^T) x = sum (I - d d^T) o; a trace of the identity keeps parallel lines solvable.
-
-    Args:
-        origins: [n, 3] points of the lines.
-        directions: [n, 3] of any length but 0.
-
-    Returns:
-        [3] point.
     """
     d = directions / np.linalg.norm(directions, axis=1, keepdims=True)  # rounded ones outweigh the trace
     projections = np.eye(3) - d[:, :, None] * d[:, None, :]

@@ -1,14 +1,19 @@
-"""One photo of a posed image set: its colours, the object's mask, and which of its pixels say something."""
+"""The photos of a posed image set: their colours, the object's masks, and which of their pixels say something.
+
+As many are read at a time as the memory allows, into one array in memory or in a file.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
+from PIL import Image
 from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import NEGATIVE_SHARE
@@ -17,25 +22,37 @@ from splitnerf.data.images import (
     LDR_SUFFIXES,
     area_average,
     linear_to_srgb,
+    read_codes,
     read_colours,
     read_header,
     read_image,
 )
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import check_shape, lens_intrinsics, undistort
-from splitnerf.data.masks import read_mask
-from splitnerf.data.pixels import averaged_codes, decoded, encoded
-from splitnerf.errors import InputError
+from splitnerf.data.pixels import (
+    GB,
+    Photos,
+    averaged_codes,
+    decoded,
+    encoded,
+    folder_of_files,
+    forget_pages,
+    new_array,
+    room_for_photos,
+)
+from splitnerf.data.reading import Reading
+from splitnerf.errors import InputError, note_once
 
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
-PEAK, BRIGHT = (
-    0.9,
-    0.999,
-)  # a photo of floats is kept so that this share of its values lies below this one; 1 counts as clipped
+PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT lies below PEAK; 1 counts as clipped
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
+
+MOST_LABELS = 32  # values up to which a mask of more than two of them is taken for one of labels
+THREADS = 8
+WORK, WORK_BENT = 24, 110  # bytes a pixel of the file, while a photo is read; where it is turned into floats
 
 
 @dataclass
@@ -70,11 +87,9 @@ def silhouette_factor(height: int, width: int) -> int:
 
 
 def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | None = None) -> Photo:
-    """Reads a frame's image and masks, frees them from the lens's distortion, and averages them down.
+    """Reads a frame's image and masks, frees them from the lens's distortion, and averages them down by `downscale`.
 
     Args:
-        frame: The frame.
-        downscale: Integer factor of at least 1.
         mask_kind: "object" or "ignore": what the mask file is where the frame leaves it open.
         separated: The mask that was found for the image, which counts where the frame has none or a full one; or None.
 
@@ -98,9 +113,7 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     alpha = alpha if masked else np.full((height, width, 1), 255, np.uint8)
     kind = np.uint8 if colour.dtype == alpha.dtype == np.uint8 else np.uint16
     rgba = np.concatenate([encoded(colour, kind), encoded(alpha, kind)], axis=-1)
-    whole = (
-        is_object and frame.mask_path is not None and channels in (1, 3)
-    )  # where a photo has alpha, nothing lies behind
+    whole = is_object and frame.mask_path is not None and channels in (1, 3)  # with alpha, nothing lies behind
     says_nothing = bool((rgba[..., 3] == np.iinfo(kind).max).all())
     if frame.distortion is not None:
         straight, known = _undistort(decoded(rgba), known, frame, straight=whole)
@@ -137,12 +150,9 @@ def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bool]:
-    """The sizes [n, 2] (height, width) of the photos, and whether bytes hold their values exactly, by the files' headers alone.
-
-    Raises:
-        InputError: A file is missing or no image, a photo has another shape than its lens says, a mask has another size than
-            its photo, or a photo is too small for the downscale.
-    """
+    """The sizes [n, 2] (height, width) of the photos, and whether bytes hold their values exactly, by the files'
+    headers alone. Raises InputError where a file is missing or no image, a photo has another shape than its lens says,
+    a mask has another size than its photo, or a photo is too small for the downscale."""
     sizes, exact = [], downscale == 1 and all(frame.distortion is None for frame in frames)
     for frame in frames:
         path = frame.image_path
@@ -185,15 +195,9 @@ def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> 
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
     """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied.
 
-    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole numbers are
-    sRGB, or follow the camera's curve.
-
-    Args:
-        path: The image.
-        gamma: The exponent that gives linear values, or 0 for sRGB's curve.
-
-    Raises:
-        InputError: Floats are negative, infinite or NaN.
+    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole
+    numbers are sRGB or, where `gamma` is not 0, linear values to the power of 1 / gamma. Raises InputError where floats
+    are negative, infinite or NaN.
     """
     pixels = read_colours(path)
     n_colours = 3 if pixels.shape[2] >= 3 else 1
@@ -214,12 +218,9 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
 
 
 def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
-    """The values with negative ones set to 0: noise of raw photos, or what a filter leaves beside a lamp. Together they are at
-    most a thousandth of the sum, and none is further below 0 than a tenth of the brightest value is above.
-
-    Raises:
-        InputError: There are more, or NaN or infinite ones.
-    """
+    """The values with negative ones set to 0: noise of raw photos, or what a filter leaves beside a lamp. Together they
+    are at most a thousandth of the sum, and none is further below 0 than a tenth of the brightest value is above; else,
+    and for NaN or infinite ones, it raises InputError."""
     dark, total = -pixels.sum(where=pixels < 0, dtype=np.float64), pixels.sum(where=pixels > 0, dtype=np.float64)
     deepest = -RINGING * pixels.max()
     if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total and pixels.min() >= deepest):
@@ -230,14 +231,9 @@ def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
 def _undistort(
     rgba: np.ndarray, known: np.ndarray | None, frame: Frame, *, straight: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The image [H, W, 4] as a pinhole sees it, without meaning where it is not known, and the known pixels [H, W, 1].
-
-    Args:
-        rgba: [H, W, 4], straight alpha.
-        known: [H, W, 1] bool, or None.
-        frame: The frame.
-        straight: Whether the colours are the photo's also where alpha is 0; else only colour times alpha is one.
-    """
+    """The image [H, W, 4] as a pinhole sees it, without meaning where it is not known, and the known pixels [H, W, 1]
+    (None: all). `straight`: whether the colours are the photo's also where alpha is 0; else only colour times alpha is
+    one."""
     size = rgba.shape[:2]
     if not straight:
         rgba = np.concatenate([rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]], axis=-1)
@@ -252,3 +248,139 @@ def _undistort(
         rgba[..., :3] = np.minimum(rgba[..., :3] / np.maximum(rgba[..., 3:], 1 / 255), 1)
     known = covered[..., None] if known is None else covered[..., None] & (planes[..., 4:] > CERTAIN)
     return rgba, known
+
+
+def read_mask(path: Path) -> np.ndarray:
+    """A mask, white where it is set.
+
+    Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries in colour. Of two
+    values the larger one is white and the other one black, whatever they are.
+
+    Returns:
+        [H, W, 1] uint8, uint16, or float32 in [0, 1].
+
+    Raises:
+        InputError: The file cannot be read, is coloured, holds labels of more than one object, or floats out of bounds.
+    """
+    pixels = read_codes(path)
+    if pixels.dtype.kind == "f" and not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
+        raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
+    alpha = pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
+    if alpha is not None and alpha.min() != alpha.max():
+        return alpha
+    if (entries := _palette_entries(path)) is not None:
+        mask = entries[..., None]
+    elif pixels.shape[2] >= 3 and (pixels[..., :3] != pixels[..., :1]).any():
+        raise InputError(f"{path}: is coloured, which no mask is; save the object as white on black")
+    else:
+        mask = pixels[..., :1]
+    if mask.dtype.kind == "f" or path.suffix.lower() in (".jpg", ".jpeg"):  # whose values are not exact
+        return mask
+    values, most = np.flatnonzero(np.bincount(mask.ravel())), np.iinfo(mask.dtype).max
+    if len(values) == 2:
+        return np.where(mask == values[1], most, 0).astype(mask.dtype)
+    if len(values) > 2 and values[-1] < MOST_LABELS:
+        raise InputError(
+            f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black"
+        )
+    return mask if values[0] == 0 or len(values) > 2 else np.full_like(mask, most)
+
+
+def _palette_entries(path: Path) -> np.ndarray | None:
+    """[H, W] the numbers of the entries of a PNG file's palette; None where it has none, or those in use are grey: programs that
+    make files small order black and white as they like."""
+    with open(path, "rb") as file:
+        if file.read(26)[25:26] != b"\3":  # the colour type, in the header of a PNG
+            return None
+    with Image.open(path) as image:
+        entries, colours = np.asarray(image), np.asarray(image.getpalette("RGB")).reshape(-1, 3)
+        used = colours[np.flatnonzero(np.bincount(entries.ravel()))]
+        return None if (used == used[:, :1]).all() else entries
+
+
+class Loader:
+    """The photos of some frames.
+
+    All sizes are known, and all is estimated, before the first pixel is read.
+
+    Args:
+        root: The data's folder.
+        frames: The frames.
+        downscale: Integer factor of at least 1.
+        reading: How the frames are read; its `max_memory` counts the photos that are in memory already.
+        keep: Whether pixels are kept; else only what :meth:`load` returns.
+
+    Attributes:
+        frames: The frames.
+        sizes: [n, 2] height and width of the photos as they are kept, in the upper left corner of an array for the tallest
+            and the widest.
+        exposures: [n] float64, the factors of the photos' linear values, as they are kept.
+
+    Raises:
+        InputError: A file cannot be used, or neither memory nor disk have room for the photos.
+    """
+
+    def __init__(self, root: Path, frames: Sequence[Frame], downscale: int, reading: Reading, keep: bool = True):
+        self.root, self.frames, self.downscale, self.separated = root, frames, downscale, reading.separated
+        sizes, exact = check_files(frames, downscale)
+        height, width = sizes[sizes.prod(axis=1).argmax()].tolist()  # of the largest
+        self.sizes = sizes // downscale
+        shape = (len(frames), *self.sizes.max(axis=0).tolist())
+        kind, bent = np.dtype(np.uint8 if exact else np.uint16), any(frame.distortion is not None for frame in frames)
+        masks = any(f.dynamic_mask_path or (f.mask_path and f.mask_kind != "object") for f in frames)
+        hides = bent or masks or bool((self.sizes != shape[1:]).any())
+        floats = bent or any(f.gamma != 0 or f.image_path.suffix.lower() in HDR_SUFFIXES for f in frames)
+        work = height * width * (WORK_BENT if floats else WORK)
+        size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
+        room = room_for_photos(reading.max_memory)
+        in_file = size + work > room
+        whole = max(room, int(reading.max_memory * GB))  # with what the photos of another split take
+        room -= 0 if in_file else size
+        if work > whole:
+            raise InputError(
+                f"{root}: one photo of {width}x{height} takes {work / GB:.2g} GB while it is read, more than the "
+                f"{whole / GB:.2g} GB for photos; make the photos smaller, or give a larger --max-memory"
+            )
+        if in_file and keep:
+            note_once(
+                f"{root}: {len(frames)} photos take {size / GB:.2g} GB, more than the {max(room, 0) / GB:.2g} GB of memory left "
+                f"for photos (--max-memory): they are read from a file in {folder_of_files()}"
+            )
+        self.threads = max(1, min(THREADS, os.cpu_count() or 1, room // work))
+        self.codes = new_array((*shape, 4), kind, in_file) if keep else None
+        self._known = new_array(shape, np.dtype(bool), in_file) if keep and hides else None
+        self.known: np.ndarray | None = None
+        self.exposures = np.array([frame.exposure for frame in frames])
+
+    def load(self, mask_kind: str) -> list[Photo]:
+        """Reads the photos, whose pixels it keeps.
+
+        Args:
+            mask_kind: "object" or "ignore", see :func:`load_photo`.
+
+        Returns:
+            The photos without pixels.
+        """
+        with ThreadPoolExecutor(max_workers=self.threads) as pool:
+            photos = list(pool.map(lambda i: self._load(i, mask_kind), range(len(self.frames))))
+        self.exposures = np.array([frame.exposure * photo.scale for frame, photo in zip(self.frames, photos)])
+        smaller = bool((self.sizes != self.sizes.max(axis=0)).any())
+        self.known = self._known if smaller or any(photo.seen is not None for photo in photos) else None
+        return photos
+
+    @property
+    def photos(self) -> Photos:
+        """The pixels."""
+        return Photos(self.codes, self.exposures)
+
+    def _load(self, i: int, mask_kind: str) -> Photo:
+        frame, found = self.frames[i], self.separated
+        found = None if found is None else found / separated_mask(frame.image_path, self.root)
+        photo = load_photo(frame, self.downscale, mask_kind, found)
+        height, width = self.sizes[i]
+        if self.codes is not None:
+            self.codes[i, :height, :width] = encoded(photo.rgba, self.codes.dtype)
+            forget_pages(self.codes)
+        if self._known is not None:
+            self._known[i, :height, :width] = True if photo.known is None else photo.known
+        return replace(photo, rgba=None, known=None)

@@ -41,16 +41,9 @@ def encoded(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
 
 
 def averaged_codes(rgba: np.ndarray, factor: int, *, object_alone: bool = True) -> np.ndarray:
-    """A photo averaged down in linear light, block by block; incomplete blocks at the bottom and right are cropped.
-
-    Args:
-        rgba: [H, W, 4] sRGB, straight alpha: whole numbers, or floats in [0, 1].
-        factor: The edge of a block in pixels; 1 returns the photo itself.
-        object_alone: Whether colours weigh by alpha, and are 0 where it is 0; else they are the means of all.
-
-    Returns:
-        [H // factor, W // factor, 4] uint16; with a factor of 1 the photo itself, of its own type.
-    """
+    """A photo [H, W, 4] sRGB, straight alpha, whole numbers or floats in [0, 1], averaged down in linear light, block
+    by block, to [H // factor, W // factor, 4] uint16; with a factor of 1 the photo itself. Incomplete blocks are
+    cropped. With `object_alone` colours weigh by alpha, and are 0 where it is 0; else they are the means of all."""
     if factor == 1:
         return rgba
     return _core.average_photo(rgba if rgba.dtype.kind != "f" else encoded(rgba, np.uint16), factor, object_alone)
@@ -155,11 +148,8 @@ def room_for_photos(max_memory: float) -> int:
 
 
 def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndarray:
-    """An array of zeros, in memory or in a file without a name, which ends with the array or the program.
-
-    Raises:
-        InputError: The disk has no room for it.
-    """
+    """An array of zeros, in memory or in a file without a name, which ends with the array or the program. Raises
+    InputError where the disk has no room for it."""
     if not in_file:
         array = np.zeros(shape, dtype)
         _in_memory[id(array)] = array

@@ -18,15 +18,9 @@ LONGEST_PICKLE = 1 << 22  # bytes; a checkpoint of a run has about ten thousand
 
 
 def write_tensors(path: Path, content: dict) -> None:
-    """Writes a new file and then renames it over the old one, so that a complete file always exists.
-
-    Args:
-        path: The file.
-        content: Tensors of any device, plain values, and lists and dictionaries of them. "format" must be among its keys.
-
-    Raises:
-        OSError: The disk is full or the folder cannot be written; the old file is kept.
-    """
+    """Writes tensors of any device, plain values, and lists and dictionaries of them, "format" among the keys, to a new
+    file that replaces the old one. Raises OSError where the disk is full or the folder cannot be written; the old file
+    is kept."""
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         try:
             torch.save(on_cpu(content), file)
@@ -39,10 +33,8 @@ def read_tensors(path: Path) -> dict:
     """Reads a file from any source with torch's restricted unpickler.
 
     The container is checked first: nothing in it is compressed, and its pickle names only tensors. So reading takes
-    about as much memory as the file has bytes.
-
-    Raises:
-        ValueError: The file is damaged, or is none of tensors with a "format".
+    about as much memory as the file has bytes. Raises ValueError where the file is damaged, or is none of tensors with
+    a "format".
     """
     try:
         _check_container(path)

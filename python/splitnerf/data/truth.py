@@ -1,4 +1,5 @@
-"""The truth that may lie beside a dataset: material and normal maps per test view, the light, the mesh.
+"""The truth that may lie beside a dataset: material and normal maps per test view, the light, the mesh, and the test views under
+other lights, which are read one at a time.
 
 Files, `r_N` standing for the image's own name, each optional:
     r_N_albedo.png   base colour, sRGB, straight alpha
@@ -8,6 +9,9 @@ Files, `r_N` standing for the image's own name, each optional:
     light.hdr, mesh.ply   in the dataset's folder
 Beside an image that has `r_N_alpha.png` too (Shiny Blender), `r_N_normal.png` is n / 2 + 1 / 2, linear.
 In view folders (:mod:`splitnerf.data.layouts.view_folders`) `albedo.png`, linear, and `normal.png` lie beside `rgba.png`.
+
+The truth of map M is `r_N_relit_M.png` beside `r_N.png`, or `rgba_M.png` in a view folder: sRGB, straight alpha. The
+map itself is `relight_M.hdr` (or .exr) in the data's folder, or M or relight_M with either suffix in a folder of maps.
 """
 
 from __future__ import annotations
@@ -19,14 +23,18 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from splitnerf.data.asset import unit
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import read_environment
-from splitnerf.data.images import area_average, read_image, srgb_to_linear
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, srgb_to_linear
 from splitnerf.data.layouts import view_folders
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.errors import InputError
 
 OPAQUE = 0.9
+PREFIX = "relight_"
+PROTOCOLS = {"low": (8, 20), "high": (7, 20)}
+"""Maps and test views of the published protocols: low-frequency probes (NeRFactor's), and high-frequency maps."""
 
 
 @dataclass
@@ -59,15 +67,8 @@ class SceneTruth:
 
 
 def load_scene_truth(root: str | os.PathLike, origin: np.ndarray | None = None) -> SceneTruth:
-    """Loads `light.hdr` and `mesh.ply` from a dataset's folder where they exist.
-
-    Args:
-        root: The folder.
-        origin: [3] the point of the files' world that is the origin here, see `Dataset`; None for 0.
-
-    Raises:
-        InputError: One exists but cannot be used.
-    """
+    """Loads `light.hdr` and `mesh.ply` from a dataset's folder where they exist; the mesh is moved by -`origin`, see
+    `Dataset`. Raises InputError where one exists but cannot be used."""
     light, mesh = Path(root) / "light.hdr", Path(root) / "mesh.ply"
     truth = SceneTruth(
         read_environment(light) if light.is_file() else None, read_mesh(mesh) if mesh.is_file() else None
@@ -78,17 +79,8 @@ def load_scene_truth(root: str | os.PathLike, origin: np.ndarray | None = None) 
 
 
 def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:
-    """Reads a triangle mesh, vertices as stored.
-
-    Args:
-        path: Any format that trimesh reads.
-
-    Returns:
-        One mesh with finite vertices and at least one triangle of non-zero area.
-
-    Raises:
-        InputError: The file is missing or unreadable, or the mesh is degenerate or empty.
-    """
+    """Reads a triangle mesh of any format that trimesh reads, vertices as stored, finite and with an area. Raises
+    InputError where the file is missing or unreadable, or the mesh is degenerate or empty."""
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such mesh; check the path")
@@ -103,55 +95,28 @@ def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:
 
 
 def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
-    """Loads the truth maps of every view of a split, downscaled like its images.
-
-    Args:
-        dataset: A loaded split.
-
-    Returns:
-        One `ViewTruth` per frame, in order.
-
-    Raises:
-        InputError: A map exists but is unreadable, has too few channels or another size than its image.
-    """
+    """Loads the truth maps of every view of a split, downscaled like its images. Raises InputError where a map exists
+    but is unreadable, has too few channels or another size than its image."""
     return [_load_view(dataset, view) for view in range(len(dataset))]
 
 
 def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Restores normals whose negative components were clipped to 0 before sRGB encoding.
+    """Unit normals [..., 3] float32 whose negative components were clipped to 0 before they were sRGB-encoded, 0 where
+    unknown, and the known pixels [...] bool.
 
     A single component of 0 is restored as -sqrt(1 - sum of the others' squares); with more zeros the normal is unknown.
-
-    Args:
-        encoded: [..., 3] float32 in [0, 1], sRGB-encoded.
-
-    Returns:
-        Unit normals [..., 3] float32, 0 where unknown, and the known pixels [...] bool.
     """
     components = srgb_to_linear(encoded)
     clipped = components <= 0
     known = clipped.sum(axis=-1) <= 1
     missing = np.sqrt(np.maximum(1 - (components**2).sum(axis=-1, keepdims=True), 0))
-    normals = np.where(clipped, -missing, components)
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-8)
+    normals = unit(np.where(clipped, -missing, components))
     return np.where(known[..., None], normals, 0).astype(np.float32), known
 
 
 def read_map(dataset: Dataset, view: int, path: Path, channels: int) -> np.ndarray | None:
-    """Reads a map that belongs to a view, at the file's own size.
-
-    Args:
-        dataset: The split.
-        view: The number of the view, whose image the map must fit.
-        path: The map's file.
-        channels: The least number of channels.
-
-    Returns:
-        [H, W, C] float32, or None where there is no such file.
-
-    Raises:
-        InputError: The file is unreadable, has too few channels, NaN, or another size than its image.
-    """
+    """Reads a map of a view as [H, W, C] float32, at the file's own size; None where there is no such file. Raises
+    InputError where the file is unreadable, has fewer than `channels`, NaN, or another size than the view's image."""
     if not path.is_file():
         return None
     pixels = read_image(path)
@@ -163,6 +128,56 @@ def read_map(dataset: Dataset, view: int, path: Path, channels: int) -> np.ndarr
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
     return pixels
+
+
+def relit_path(image_path: Path, name: str) -> Path:
+    """Where the view of `image_path` under map `name` lies."""
+    stem = image_path.stem if image_path.name == view_folders.PHOTO else f"{image_path.stem}_relit"
+    return image_path.with_name(f"{stem}_{name}.png")
+
+
+def read_relit(dataset: Dataset, index: int, name: str) -> np.ndarray:
+    """One view under the light of map `name`, [H, W, 4] float32 sRGB in [0, 1], straight alpha, at the dataset's
+    downscale. Raises InputError where the image is missing, unreadable, has no alpha or another size than the view's.
+    """
+    path = relit_path(dataset.image_paths[index], name)
+    pixels = read_map(dataset, index, path, 4)
+    if pixels is None:
+        raise InputError(f"{path}: no such image, the truth of {dataset.frame_names[index]} under {name}; add it")
+    return dataset.padded(decoded(averaged_codes(pixels[..., :4], dataset.downscale)))
+
+
+def map_files(folder: Path, *, prefixed: bool = False) -> dict[str, Path]:
+    """The .hdr and .exr maps of a folder by name, sorted; names have no suffix and no prefix `relight_`. Of two with
+    one name the .exr counts. `prefixed`: only files with the prefix count, as in a dataset's folder."""
+    found = {}
+    for path in sorted(folder.iterdir(), key=lambda path: (path.suffix.lower() != ".exr", path.name), reverse=True):
+        if path.suffix.lower() in HDR_SUFFIXES and (path.name.startswith(PREFIX) or not prefixed):
+            found[path.stem.removeprefix(PREFIX)] = path
+    return dict(sorted(found.items()))
+
+
+def relight_maps(dataset: Dataset, folder: Path | None = None, protocol: str | None = None) -> dict[str, Path]:
+    """The maps to relight with, by name: those of a folder, None for the dataset's own, that have truth images; or with
+    a protocol "low" or "high" all of the folder, whose number and that of the views must be those in `PROTOCOLS`.
+    Raises InputError where the folder is missing, none of its maps has truth, or it does not fit the protocol."""
+    if folder is not None and not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; give --maps a folder of .hdr or .exr maps")
+    files = map_files(dataset.root, prefixed=True) if folder is None else map_files(folder)
+    if protocol is not None:
+        n_maps, n_views = PROTOCOLS[protocol]
+        if len(files) != n_maps:
+            found = f"{folder or dataset.root}: holds {len(files)} maps"
+            raise InputError(f"{found}, --lights {protocol} needs {n_maps}; give another --maps")
+        if len(dataset) < n_views:
+            found = f"{dataset.root}: has {len(dataset)} test views"
+            raise InputError(f"{found}, --lights {protocol} needs {n_views}; leave --lights out")
+        return files
+    kept = {n: f for n, f in files.items() if any(relit_path(image, n).is_file() for image in dataset.image_paths)}
+    if folder is not None and not kept:
+        example = relit_path(dataset.image_paths[0], next(iter(files), "NAME"))
+        raise InputError(f"{folder}: no map has truth images such as {example.name} in {dataset.root}; check the names")
+    return kept
 
 
 def _load_view(dataset: Dataset, view: int) -> ViewTruth:

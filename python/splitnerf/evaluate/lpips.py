@@ -18,11 +18,6 @@ SOURCE = f"https://download.pytorch.org/models/{BACKBONE_WEIGHTS}"
 Distance = Callable[[np.ndarray, np.ndarray], float]
 
 
-def load_distance() -> Distance | None:
-    """See :func:`find_distance`."""
-    return find_distance()[0]
-
-
 def find_distance() -> tuple[Distance | None, str]:
     """The VGG distance of the package `lpips`, or None and a line that says what is missing.
 

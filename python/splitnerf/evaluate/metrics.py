@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from splitnerf.data.environment import resize_environment
@@ -15,38 +16,27 @@ F_SCORE_SHARE = 0.01
 
 
 def psnr(prediction: np.ndarray, truth: np.ndarray) -> float:
-    """-10 log10(MSE) in dB, data range 1; equal images give 100 dB.
-
-    Args:
-        prediction: The values, any shape.
-        truth: The true values, with the shape of `prediction`.
-    """
+    """-10 log10(MSE) in dB of arrays of one shape, data range 1; equal ones give 100 dB."""
     mse = np.mean((np.asarray(prediction, np.float64) - truth) ** 2)
     return float(-10 * np.log10(max(mse, MSE_FLOOR)))
 
 
 def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
-    """Structural similarity: 11 x 11 Gaussian window of sigma 1.5, data range 1, mean over full windows and channels.
-
-    Images smaller than the window are compared with the largest window that fits.
-
-    Args:
-        prediction: [H, W, C].
-        truth: [H, W, C].
-
-    Returns:
-        At most 1.
+    """Structural similarity of images [H, W, C], at most 1: 11 x 11 Gaussian window of sigma 1.5, data range 1, mean
+    over full windows and channels. Images smaller than the window are compared with the largest window that fits.
 
     Source: Wang et al., Image quality assessment: from error visibility to structural similarity, 2004.
     """
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     radius = min(5, (min(x.shape[:2]) - 1) // 2)
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / 1.5) ** 2)
-    kernel /= kernel.sum()
-    mean_x, mean_y = _filter(x, kernel), _filter(y, kernel)
-    var_x = _filter(x * x, kernel) - mean_x**2
-    var_y = _filter(y * y, kernel) - mean_y**2
-    covariance = _filter(x * y, kernel) - mean_x * mean_y
+
+    def mean(image: np.ndarray) -> np.ndarray:
+        inside = slice(radius, -radius or None)
+        return gaussian_filter(image, 1.5, axes=(0, 1), radius=radius)[inside, inside]
+
+    mean_x, mean_y = mean(x), mean(y)
+    var_x, var_y = mean(x * x) - mean_x**2, mean(y * y) - mean_y**2
+    covariance = mean(x * y) - mean_x * mean_y
     c1, c2 = 0.01**2, 0.03**2
     luminance = (2 * mean_x * mean_y + c1) / (mean_x**2 + mean_y**2 + c1)
     structure = (2 * covariance + c2) / (var_x + var_y + c2)
@@ -54,16 +44,8 @@ def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
 
 
 def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """The factor per channel that brings the prediction nearest to the truth: sum w x y / sum w x^2.
-
-    Args:
-        prediction: [m, C] linear.
-        truth: [m, C] linear.
-        weights: [m], 1 by default.
-
-    Returns:
-        [C] float64; 1 for a channel that is 0 everywhere.
-    """
+    """The factor per channel [C] float64 that brings a linear prediction [m, C] nearest to the truth: sum w x y / sum w
+    x^2, with weights [m], 1 by default; 1 for a channel that is 0 everywhere."""
     return scale_of_sums(lsq_sums(prediction, truth, weights))
 
 
@@ -99,29 +81,16 @@ def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
 
 
 def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray, threshold: float = 0.5) -> float:
-    """Mean recall over the classes (metal, not metal) that the truth has.
-
-    Args:
-        prediction: [m] in [0, 1].
-        truth: [m] in [0, 1].
-        threshold: The value above which a pixel counts as metal, in both.
-    """
+    """Mean recall over the classes (above the threshold: metal; not metal) that the truth [m] in [0, 1] has."""
     predicted, actual = np.asarray(prediction) > threshold, np.asarray(truth) > threshold
     return float(np.mean([(predicted == actual)[actual == c].mean() for c in (False, True) if (actual == c).any()]))
 
 
 def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
-    """PSNR of an environment map after removing the scale that albedo and light share.
+    """PSNR in dB, at most 100, of an environment map [H, W, 3] after removing the scale that albedo and light share.
 
-    Both are brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the
+    Both maps are brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the
     truth's 99th percentile and clipped to [0, 1]; pixels weigh by their solid angle.
-
-    Args:
-        light: [H, W, 3] linear radiance, equirectangular.
-        truth: [H, W, 3] linear radiance, equirectangular.
-
-    Returns:
-        dB, at most 100.
     """
     x, y = (resize_environment(image, *LIGHT_SIZE).reshape(-1, 3).astype(np.float64) for image in (light, truth))
     weights = np.repeat(solid_angle_weights(LIGHT_SIZE[0]), LIGHT_SIZE[1])
@@ -140,13 +109,7 @@ def solid_angle_weights(height: int) -> np.ndarray:
 def mesh_distances(
     mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES, seed: int = 0
 ) -> tuple[float, float]:
-    """Chamfer distance and F-score between two surfaces, by points spread over them.
-
-    Args:
-        mesh: The reconstruction.
-        truth: The true mesh, in the same frame.
-        samples: The number of points on each surface.
-        seed: The seed of the points.
+    """Chamfer distance and F-score between two surfaces in one frame, by `samples` points spread over each.
 
     Returns:
         The mean of both directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares
@@ -159,11 +122,3 @@ def mesh_distances(
     precision, recall = (to_truth < threshold).mean(), (to_mesh < threshold).mean()
     f_score = 2 * precision * recall / max(precision + recall, 1e-12)
     return float((to_truth.mean() + to_mesh.mean()) / 2), float(f_score)
-
-
-def _filter(image: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Separable convolution over rows and columns, full windows only."""
-    n = len(kernel)
-    height, width = image.shape[0] - n + 1, image.shape[1] - n + 1
-    image = sum(k * image[i : i + height] for i, k in enumerate(kernel))
-    return sum(k * image[:, i : i + width] for i, k in enumerate(kernel))

@@ -1,21 +1,36 @@
-"""The scores of `splitnerf evaluate`: rendered maps of the test views against images and truth."""
+"""The scores of `splitnerf evaluate`: rendered maps of the test views against images and truth, over sRGB on white."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import over_background
+from splitnerf.data.images import linear_to_srgb, over_background
 from splitnerf.data.pixels import Photos
 from splitnerf.data.truth import OPAQUE, ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.lpips import Distance
-from splitnerf.evaluate.similarity import ScaledView, image_scores, mean_scores, scaled_scores
 
+MEDIAN_PIXELS = 20_000  # a view contributes at most about twice as many ratios to the median
+SCORES = ("psnr", "ssim", "lpips")
 Prediction = dict[str, np.ndarray]
+
+
+@dataclass
+class ScaledView:
+    """A prediction [H, W, 3] linear, straight, that is known up to one factor per channel, its coverage `alpha` [H, W],
+    and the same of the truth. `group` is whose scores are averaged in addition to those of all views, such as the
+    light's name."""
+
+    group: str
+    prediction: np.ndarray
+    alpha: np.ndarray
+    truth: np.ndarray
+    truth_alpha: np.ndarray
 
 
 def evaluate_maps(
@@ -30,40 +45,22 @@ def evaluate_maps(
     relight: dict | None = None,
     distance: Distance | None = None,
 ) -> dict:
-    """Scores the maps of the test views, the light and the mesh.
+    """Scores the maps of the test views, the light and the mesh: the contents of `evaluation.json`, None where there is
+    no truth.
 
     PSNR and SSIM are over sRGB on white, means over images. Pixels that are invalid in the photos do not count in the
     PSNR of novel views and are white in both images elsewhere. Albedo has one free factor per channel and scene, since
-    light and albedo share it, see :func:`splitnerf.evaluate.similarity.scaled_scores`. Foreground is alpha > 0.9 in
-    prediction and truth.
+    light and albedo share it, see :func:`scaled_scores`. Foreground is alpha > 0.9 in prediction and truth.
 
     Args:
         predictions: Per view float32 maps: `rgb` [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear,
             `roughness` [H, W], `metallic` [H, W], `normal` [H, W, 3] unit world. Only `alpha` must be there.
-        dataset: The split that was rendered, in the same order and size.
-        truths: One per view.
-        light: [h, w, 3] linear radiance, equirectangular.
-        light_truth: [h, w, 3] linear radiance.
-        mesh: The reconstruction in the data's world frame.
-        mesh_truth: The true mesh.
-        seconds: Training time to record.
-        relight: The scores of :func:`splitnerf.evaluate.relight.relight_scores`, to record; or None.
-        distance: The LPIPS distance, or None.
-
-    Returns:
-        The contents of `evaluation.json`; None where there is no truth.
-
-    Raises:
-        ValueError: Numbers or sizes of predictions, images and truths differ.
+        dataset, truths: The views that were rendered, and the truth of each.
+        light, light_truth: [h, w, 3] linear radiance, equirectangular.
+        mesh, mesh_truth: In the data's world frame.
+        seconds, relight: The training time and :func:`splitnerf.evaluate.scoring.relight_scores`, to record.
     """
-    if not len(predictions) == len(dataset) == len(truths):
-        raise ValueError(f"{len(predictions)} predictions for {len(dataset)} images and {len(truths)} truths")
     known = [None] * len(dataset) if dataset.known is None else dataset.known
-    shape = dataset.images.shape[1:]
-    for prediction in predictions:
-        for key in prediction.keys() & {"rgb", "alpha"}:
-            if prediction[key].shape[:2] != shape[:2]:
-                raise ValueError(f"{key} of a prediction is {list(prediction[key].shape)}, image is {list(shape)}")
     if dataset.known is not None:
         predictions = [p | {"alpha": p["alpha"] * k} for p, k in zip(predictions, known)]
     foregrounds = [(p["alpha"] > OPAQUE) & (dataset.images[i, ..., 3] > OPAQUE) for i, p in enumerate(predictions)]
@@ -97,6 +94,59 @@ def evaluate_maps(
     }
 
 
+def image_scores(
+    image: np.ndarray, truth: np.ndarray, distance: Distance | None = None, known: np.ndarray | None = None
+) -> dict:
+    """`psnr` in dB, `ssim` and `lpips` (None without `distance`) of [H, W, 3] sRGB images; the first is clipped. The
+    PSNR is over the pixels `known` [H, W] bool, None for all."""
+    image = np.clip(image, 0, 1)
+    return {
+        "psnr": metrics.psnr(image, truth) if known is None else metrics.psnr(image[known], truth[known]),
+        "ssim": metrics.ssim(image, truth),
+        "lpips": None if distance is None else distance(image, truth),
+    }
+
+
+def mean_scores(scores: Sequence[dict]) -> dict:
+    """The means of the results of `image_scores` for at least one image."""
+    missing = scores[0]["lpips"] is None
+    return {key: None if key == "lpips" and missing else float(np.mean([s[key] for s in scores])) for key in SCORES}
+
+
+def on_white(linear: np.ndarray, alpha: np.ndarray, scale: np.ndarray | float = 1.0) -> np.ndarray:
+    """The image [H, W, 3] that the protocol compares: a straight linear image, scaled, in sRGB, clipped and on
+    white."""
+    return over_background(np.clip(linear_to_srgb(linear * scale), 0, 1), alpha)
+
+
+def scaled_scores(
+    views: Callable[[], Iterable[ScaledView]], distance: Distance | None = None
+) -> tuple[dict, dict[str, dict]]:
+    """Scores predictions with one free factor per channel for all views together; `views` is called twice.
+
+    The factor is fitted in linear light over the foreground of all views, alpha > 0.9 in prediction and truth. `raw`
+    has no factor, `lsq` that of least squares (the headline), `median` the median of truth / prediction.
+
+    Returns:
+        The scores (`psnr`, `ssim`, `lpips` of the headline, then the variants with their `scale` [3]), and the
+        headline's scores per group.
+    """
+    scales = _scales(views())
+    scores: dict[str, list[dict]] = {name: [] for name in scales}
+    groups: dict[str, list[dict]] = {}
+    for view in views():
+        truth = on_white(view.truth, view.truth_alpha)
+        for name, scale in scales.items():
+            headline = name == "lsq"
+            image = on_white(view.prediction, view.alpha, scale)
+            scores[name].append(image_scores(image, truth, distance if headline else None))
+            if headline:
+                groups.setdefault(view.group, []).append(scores[name][-1])
+    variants = {name: mean_scores(scores[name]) | {"scale": [float(s) for s in scales[name]]} for name in scales}
+    headline = {key: variants["lsq"][key] for key in SCORES}
+    return headline | variants, {group: mean_scores(members) for group, members in groups.items()}
+
+
 def _novel_view(
     predictions: Sequence[Prediction], images: Photos, known: Sequence[np.ndarray | None], distance: Distance | None
 ) -> dict | None:
@@ -125,3 +175,19 @@ def _albedo(
             yield ScaledView("", prediction["albedo"], prediction["alpha"], truths[i].albedo, images[i, ..., 3])
 
     return scaled_scores(views, distance)[0]
+
+
+def _scales(views: Iterable[ScaledView]) -> dict[str, np.ndarray]:
+    sums, samples = np.zeros((2, 3)), []
+    for x, y in _foregrounds(views):
+        sums += metrics.lsq_sums(x, y)
+        step = max(1, len(x) // MEDIAN_PIXELS)
+        samples.append((x[::step], y[::step]))
+    x, y = (np.concatenate(parts) for parts in zip(*samples))
+    return {"raw": np.ones(3), "lsq": metrics.scale_of_sums(sums), "median": metrics.median_scale(x, y)}
+
+
+def _foregrounds(views: Iterable[ScaledView]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for view in views:
+        mask = (view.alpha > OPAQUE) & (view.truth_alpha > OPAQUE)
+        yield view.prediction[mask], view.truth[mask]

@@ -19,15 +19,8 @@ COLUMNS = (
 
 
 def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
-    """A row per scene and, for more than one, their mean.
-
-    Args:
-        evaluations: Name and contents of each `evaluation.json`.
-
-    Returns:
-        Markdown. A missing value is '-'; a mean is over the scenes that have the value, and is marked with their number
-        where it is not all.
-    """
+    """Markdown with a row per name and evaluation and, for more than one, their mean. A missing value is '-'; a mean is
+    over the scenes that have the value, and is marked with their number where it is not all."""
     header, formats = ["scene"], []
     for _, group in GROUPS:
         for _, score, text in SCORES:

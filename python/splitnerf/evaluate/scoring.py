@@ -2,33 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from tqdm import tqdm
 
-from splitnerf.data.asset import Asset
+from splitnerf.data.asset import Asset, unit
 from splitnerf.data.dataset import Dataset, load_dataset, spread
-from splitnerf.data.environment import read_environment
+from splitnerf.data.environment import read_environment, turn_environment
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import srgb_to_linear, straight_srgb, to_uint8
 from splitnerf.data.json_files import read_json
+from splitnerf.data.pixels import per_channel
 from splitnerf.data.reading import Reading
-from splitnerf.data.relit import PROTOCOLS, relight_maps
-from splitnerf.data.truth import ViewTruth, load_scene_truth, load_view_truths
+from splitnerf.data.truth import (
+    OPAQUE,
+    PROTOCOLS,
+    ViewTruth,
+    load_scene_truth,
+    load_view_truths,
+    read_relit,
+    relight_maps,
+)
 from splitnerf.errors import InputError
-from splitnerf.evaluate.asset import asset_predictions, environment_beside
-from splitnerf.evaluate.exposure import exposed_like
-from splitnerf.evaluate.lpips import load_distance
-from splitnerf.evaluate.protocol import evaluate_maps
-from splitnerf.evaluate.relight import RelitViews, relight, relight_scores
+from splitnerf.evaluate.lpips import Distance, find_distance
+from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, scaled_scores
 from splitnerf.evaluate.score_table import COLUMNS, GROUPS, SCORES
 from splitnerf.progress import tracked
 from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.path_traced import MOST_SPP, AssetRenderer
 from splitnerf.render.renderer import render_maps
+
+FIRST_SEED = 1 << 31  # data are rendered with smaller ones, so that prediction and truth never share their noise
+ENVIRONMENTS = ("environment.exr", "environment.hdr")
+DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo between which pixels count for its exposure
 
 
 @dataclass(frozen=True)
@@ -58,29 +70,82 @@ class Protocol:
 
 @dataclass
 class Evaluated:
-    """Scores, and what they were computed from.
-
-    Attributes:
-        scores: The contents of evaluation.json.
-        dataset: The views.
-        predictions: Maps per view.
-        truths: Truth maps per view.
-        relit: The relit views, or None.
-    """
+    """The contents of evaluation.json, and what they were computed from: the views, their maps and their truths."""
 
     scores: dict
     dataset: Dataset
     predictions: list[dict[str, np.ndarray]]
     truths: list[ViewTruth]
-    relit: RelitViews | None
+
+
+@dataclass
+class RelitViews:
+    """The relit views of a dataset with `spp` paths a pixel: images [H, W, 4] uint8, sRGB with straight alpha, by map
+    and by view."""
+
+    images: dict[str, list[np.ndarray]]
+    dataset: Dataset
+    spp: int
+
+    def views(self) -> Iterator[ScaledView]:
+        """Each image with its truth, grouped by map; a truth image is read when its turn comes."""
+        for name, images in self.images.items():
+            for i in range(len(images)):
+                yield self.view(name, i)
+
+    def view(self, name: str, index: int) -> ScaledView:
+        """One image with its truth."""
+        prediction = self.images[name][index].astype(np.float32) / 255
+        truth = read_relit(self.dataset, index, name)
+        return ScaledView(
+            name, srgb_to_linear(prediction[..., :3]), prediction[..., 3], srgb_to_linear(truth[..., :3]), truth[..., 3]
+        )
+
+
+def render_view(
+    renderer: AssetRenderer, dataset: Dataset, index: int, environment: np.ndarray, spp: int
+) -> dict[str, np.ndarray]:
+    """The asset's maps of one view in the data's world frame, see `AssetRenderer.render`."""
+    pose, lens = dataset.world_poses[index], dataset.intrinsics[index]
+    return renderer.render(
+        environment, pose, tuple(lens), dataset.width, dataset.height, spp=spp, seed=FIRST_SEED + index
+    )
+
+
+def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], spp: int) -> RelitViews:
+    """Renders all views under all environment maps, of each of which the data must hold the truth, with `spp` paths a
+    pixel. Raises InputError where a map cannot be used, or the truth of a view is missing or unreadable."""
+    for name in maps:
+        for index in range(len(dataset)):
+            read_relit(dataset, index, name)
+    images = {}
+    with tqdm(total=len(maps) * len(dataset), desc="relighting", unit="view", leave=False, disable=None) as progress:
+        for name, path in maps.items():
+            environment = read_environment(path)
+            images[name] = []
+            for index in range(len(dataset)):
+                rendered = render_view(renderer, dataset, index, environment, spp)
+                image = np.dstack([straight_srgb(rendered["radiance"], rendered["alpha"]), rendered["alpha"]])
+                images[name].append(to_uint8(image))
+                progress.update()
+    return RelitViews(images, dataset, spp)
+
+
+def relight_scores(relit: RelitViews, distance: Distance | None = None) -> dict:
+    """Scores relit views with one factor per channel for all images of all maps. Predictions are 8-bit clipped sRGB
+    images before the factor, as if read from files.
+
+    Returns:
+        The scores of :func:`splitnerf.evaluate.protocol.scaled_scores`, `maps` (the headline's scores per map), `views`
+        (their number) and `spp`.
+    """
+    scores, per_map = scaled_scores(relit.views, distance)
+    return scores | {"maps": per_map, "views": len(relit.dataset), "spp": relit.spp}
 
 
 def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[str, Path]]:
-    """The views of a split that a protocol takes, and its maps.
-
-    Raises:
-        InputError: The data lack views or maps that the protocol needs.
-    """
+    """The views of a split that a protocol takes, and its maps. Raises InputError where the data lack views or maps
+    that the protocol needs."""
     maps = relight_maps(dataset, protocol.maps, protocol.lights)
     count = protocol.views
     if count is None:
@@ -98,7 +163,7 @@ def relit_scores(
     if not maps:
         return None, None
     relit = relight(renderer, views, maps, spp)
-    return relit, relight_scores(relit, load_distance())
+    return relit, relight_scores(relit, find_distance()[0])
 
 
 def asset_mesh(asset: Asset) -> trimesh.Trimesh:
@@ -106,19 +171,14 @@ def asset_mesh(asset: Asset) -> trimesh.Trimesh:
     return trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
 
 
+def environment_beside(path: Path) -> Path | None:
+    """The recovered light in the folder of a GLB file, if there is one."""
+    return next((path.with_name(name) for name in ENVIRONMENTS if path.with_name(name).is_file()), None)
+
+
 def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None = None) -> Evaluated:
-    """Scores a GLB file against the test views of a dataset.
-
-    Args:
-        path: The file, in the data's world frame as a run exports it.
-        data: The dataset.
-        protocol: Views and lights.
-        env: The light of the photos for the novel views; None for the environment.exr or .hdr in its folder. Without
-            either `novel_view` and `light_psnr` are None.
-
-    Raises:
-        InputError: The file, the data or the light cannot be used.
-    """
+    """Scores a GLB file, in the data's world frame, against the test views of a dataset; `env` is the light of the
+    photos, None for the environment.exr or .hdr in the file's folder. Raises InputError where a file cannot be used."""
     asset = read_asset(path)
     split = "test" if has_test_split(data, protocol.reading) else "train"
     views, maps = choose_views(load_dataset(data, split, protocol.downscale, protocol.reading), protocol)
@@ -135,20 +195,17 @@ def score_asset(
     seconds: float | None = None,
     free_exposure: bool = False,
 ) -> Evaluated:
-    """Scores an asset by path tracing.
+    """Scores an asset, in the data's world frame, by path tracing.
 
     Args:
-        asset: The asset, in the data's world frame.
         environment: [h, w, 3] the light of the photos, or None.
-        views: The views.
         maps: Environment maps for relit views, by name; none for no such views.
-        spp: Paths a pixel.
         seconds: The time that the asset took, to record.
         free_exposure: Whether each photo has an exposure of its own, which is fitted.
     """
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
-    relit = relit_scores(renderer, views, maps, spp)
+    _, relit = relit_scores(renderer, views, maps, spp)
     evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "asset", "spp": spp})
 
@@ -164,18 +221,11 @@ def score_fields(
     seconds: float,
     free_exposure: bool = False,
 ) -> Evaluated:
-    """Scores trained fields by rendering them.
-
-    Args:
-        model, grid: The trained scene.
-        views: The views.
-        mesh: The surface, in the data's world frame; None for that of the asset.
-        asset: What was exported, which the relit views show; None where there is none.
-        maps, spp, seconds, free_exposure: See :func:`score_asset`; `spp` is of the relit views.
-    """
+    """Scores trained fields by rendering them; arguments as for :func:`score_asset`, with the surface `mesh` in the
+    data's world frame (None: that of the asset), and what was exported, which the relit views show, or None."""
     predictions = [render_maps(model, grid, views, i) for i in tracked(range(len(views)), "evaluation, view")]
     light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
-    relit = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
+    relit = None if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)[1]
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
     evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "fields"})
@@ -186,7 +236,7 @@ def _scored(
     views: Dataset,
     light: np.ndarray | None,
     mesh: trimesh.Trimesh | None,
-    relit: tuple[RelitViews | None, dict | None],
+    relit: dict | None,
     seconds: float | None,
     free_exposure: bool,
 ) -> Evaluated:
@@ -203,10 +253,45 @@ def _scored(
         mesh,
         truth.mesh,
         seconds,
-        relight=relit[1],
-        distance=load_distance(),
+        relight=relit,
+        distance=find_distance()[0],
     )
-    return Evaluated(scores | ({"exposures": "fitted"} if free_exposure else {}), views, predictions, truths, relit[0])
+    return Evaluated(scores | ({"exposures": "fitted"} if free_exposure else {}), views, predictions, truths)
+
+
+def asset_predictions(
+    renderer: AssetRenderer, dataset: Dataset, environment: np.ndarray | None, spp: int
+) -> list[dict[str, np.ndarray]]:
+    """The maps of an asset at each view for :func:`splitnerf.evaluate.protocol.evaluate_maps`: `alpha`, `albedo`,
+    `roughness`, `metallic`, `normal` (without the normal map, like the truth), under a light [h, w, 3] also `rgb`; and
+    `shading_normal`, with the normal map."""
+    predictions = []
+    for index in tracked(range(len(dataset)), "path tracing, view"):
+        light = np.ones((2, 4, 3), np.float32) if environment is None else environment
+        light = light if dataset.light_turns is None else turn_environment(light, dataset.light_turns[index])
+        maps = render_view(renderer, dataset, index, light, spp)
+        prediction = {key: maps[key] for key in ("alpha", "albedo", "roughness", "metallic")}
+        prediction |= {"normal": unit(maps["smooth_normal"]), "shading_normal": unit(maps["normal"])}
+        if environment is not None:
+            prediction["rgb"] = straight_srgb(maps["radiance"], maps["alpha"])
+        predictions.append(prediction)
+    return predictions
+
+
+def exposed_like(views: Dataset, predictions: Sequence[dict[str, np.ndarray]]) -> Dataset:
+    """Views with exposures fitted to predictions (maps `rgb`, `alpha`): one factor a photo, the median ratio of the
+    channels' means where the object covers both. Photos without such pixels keep their exposure."""
+    factors = np.ones(len(views))
+    for i, maps in enumerate(predictions):
+        photo = views.images[i]
+        ours, theirs = (srgb_to_linear(x.astype(np.float32)) for x in (maps["rgb"], photo[..., :3]))
+        counts = (photo[..., 3] > OPAQUE) & (maps["alpha"] > OPAQUE)
+        exposed = theirs * per_channel(views.exposures)[i].astype(np.float32)
+        counts &= ((exposed > DARKEST) & (exposed < BRIGHTEST)).all(-1)
+        ours, theirs = (x.mean(-1).clip(1e-4) for x in (ours, theirs))
+        if counts.any():
+            factors[i] = np.exp(np.median(np.log(theirs[counts] / ours[counts])))
+    return views.exposed(per_channel(views.exposures) * factors[:, None])
 
 
 def is_asset(path: Path) -> bool:
@@ -220,11 +305,8 @@ def evaluation_path(target: Path) -> Path:
 
 
 def read_evaluation(target: Path) -> dict:
-    """The scores that an earlier evaluation of a run or a file wrote.
-
-    Raises:
-        InputError: There are none, or the file holds no scores.
-    """
+    """The scores that an earlier evaluation of a run or a file wrote. Raises InputError where there are none, or the
+    file holds no scores."""
     path = evaluation_path(target)
     if not path.is_file():
         raise InputError(f"{path}: no such evaluation; make it with `splitnerf evaluate {target} --data DATA`")

@@ -11,6 +11,7 @@ from scipy.ndimage import distance_transform_edt, zoom
 from scipy.spatial import cKDTree
 
 from splitnerf import _core
+from splitnerf.data.asset import Asset, Material, unit
 from splitnerf.export.surface import Surface, surface_materials, to_level_set
 from splitnerf.ops import MeshScene, occlusion_factors
 
@@ -21,50 +22,9 @@ MIN_UP = 0.02  # least z of a tangent-space normal
 
 
 @dataclass(frozen=True)
-class UnwrappedMesh:
-    """A mesh with texture coordinates.
-
-    Attributes:
-        vertices: [n, 3] float32.
-        faces: [m, 3] int32.
-        normals: [n, 3] float32 unit.
-        tangents: [n, 4] float32, see :func:`splitnerf.data.tangents.vertex_tangents`.
-        uv: [n, 2] float32, (0, 0) the top left corner.
-    """
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    normals: np.ndarray
-    tangents: np.ndarray
-    uv: np.ndarray
-
-
-@dataclass(frozen=True)
-class Textures:
-    """Square float32 maps, top row first.
-
-    Attributes:
-        albedo: [h, w, 3] linear.
-        roughness_metallic: [h, w, 2] in [0, 1].
-        occlusion: [h, w] in [0, 1], 1 = open.
-        normal: [h, w, 3] unit, tangent space: x along the tangent, y along the bitangent (up in the texture).
-    """
-
-    albedo: np.ndarray
-    roughness_metallic: np.ndarray
-    occlusion: np.ndarray
-    normal: np.ndarray
-
-
-@dataclass(frozen=True)
 class Texels:
-    """The texels whose centres a triangle covers.
-
-    Attributes:
-        index: [k] int64, row * size + column.
-        triangle: [k] int64.
-        weights: [k, 3] float32 barycentric coordinates.
-    """
+    """The texels whose centres a triangle covers: `index` [k] (row * size + column), `triangle` [k], and float32
+    barycentric `weights` [k, 3]."""
 
     index: np.ndarray
     triangle: np.ndarray
@@ -100,29 +60,23 @@ def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
 
 
 def bake(
-    mesh: UnwrappedMesh,
-    surface: Surface,
-    size: int,
-    *,
-    reach: float,
-    offset: float,
-    on_surface: np.ndarray | None = None,
-) -> Textures:
+    mesh: Asset, surface: Surface, size: int, *, reach: float, offset: float, on_surface: np.ndarray | None = None
+) -> tuple[Material, np.ndarray]:
     """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
 
-    The texels are evaluated in bands, so that the memory in addition to the maps does not grow with the texture.
+    The texels are evaluated in bands, so that the memory in addition to the maps does not grow with the texture. A
+    texel outside the charts has the value of the nearest texel inside.
 
     Args:
-        mesh: The mesh, in the frame of the surface.
-        surface: The fields.
+        mesh: With uv and tangents; its materials are not read.
         size: The number of texels along an edge.
-        reach: The largest distance between mesh and level set, in the surface's units.
-        offset: The distance of an occlusion ray's start from the mesh along its normal, in the surface's units.
-        on_surface: [n] bool, the vertices of the zero level set; texels of faces with others have the mesh's normals, and
-            the materials of the nearest one of these vertices. None: all.
+        reach: The largest distance between mesh and level set, in the surface's units, as `offset`.
+        offset: The distance of an occlusion ray's start from the mesh along its normal.
+        on_surface: [n] bool, the vertices of the zero level set; texels of faces with others have the mesh's normals,
+            and the materials of the nearest one of these vertices. None: all.
 
     Returns:
-        The maps; a texel outside the charts has the value of the nearest texel inside.
+        The material with its textures, and [size, size] occlusion in [0, 1], 1 = open.
 
     Raises:
         RuntimeError: The texture is too small for the mesh, or the materials are not finite.
@@ -131,26 +85,33 @@ def bake(
     covered = np.zeros(size * size, bool)
     on_surface = np.ones(len(mesh.vertices), bool) if on_surface is None else on_surface
     known = mesh.vertices[on_surface]
-    for texels in bands(mesh.uv, mesh.faces, size):
+    for texels in bands(mesh.uv, mesh.triangles, size):
         if len(texels.index) == 0:
             continue
-        rows, normals = texels.index, texels.interpolate(mesh.normals, mesh.faces)
-        places, smooth = texels.interpolate(mesh.vertices, mesh.faces), _unit(normals)
+        rows, normals = texels.index, texels.interpolate(mesh.normals, mesh.triangles)
+        places, smooth = texels.interpolate(mesh.vertices, mesh.triangles), unit(normals)
         points = to_level_set(surface, places, reach, smooth)
-        capped = np.flatnonzero(~on_surface[mesh.faces[texels.triangle]].all(axis=1))
+        capped = np.flatnonzero(~on_surface[mesh.triangles[texels.triangle]].all(axis=1))
         if len(capped):
             points[capped] = known[cKDTree(known).query(places[capped])[1]]
         albedo[rows], roughness, metallic, fine_normals = surface_materials(surface, points)
         fine_normals[capped] = smooth[capped]
         roughness_metallic[rows] = np.column_stack([roughness, metallic])
-        normal[rows] = to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.faces))
+        normal[rows] = to_tangent_space(fine_normals, normals, texels.interpolate(mesh.tangents, mesh.triangles))
         covered[rows] = True
     if not covered.any():
         raise RuntimeError(f"no texel of {size} x {size} lies in a chart; give a larger texture size")
     maps = (albedo, roughness_metallic, normal)
     fill_in(covered.reshape(size, size), maps)
     albedo, roughness_metallic, normal = (values.reshape(size, size, -1) for values in maps)
-    return Textures(albedo, roughness_metallic, bake_occlusion(mesh, size, offset), normal)
+    material = Material(
+        mesh.name,
+        metallic=1.0,
+        albedo_texture=albedo,
+        roughness_metallic_texture=roughness_metallic,
+        normal_texture=normal,
+    )
+    return material, bake_occlusion(mesh, size, offset)
 
 
 def fill_in(covered: np.ndarray, maps: tuple[np.ndarray, ...]) -> None:
@@ -167,22 +128,17 @@ def nearest_texels(covered: np.ndarray) -> np.ndarray:
     return distance_transform_edt(~covered, return_distances=False, return_indices=True)
 
 
-def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
+def bake_occlusion(mesh: Asset, size: int, offset: float) -> np.ndarray:
     """[size, size] share of the cosine-weighted hemisphere that the mesh leaves open, baked at a quarter of the
     size."""
     small = max(1, size // OCCLUSION_SHRINK)
-    texels = rasterise(mesh.uv, mesh.faces, small)
+    texels = rasterise(mesh.uv, mesh.triangles, small)
     if len(texels.index) == 0:
         return np.ones((size, size), np.float32)
-    points, normals = (
-        torch.from_numpy(values)
-        for values in (
-            texels.interpolate(mesh.vertices, mesh.faces),
-            _unit(texels.interpolate(mesh.normals, mesh.faces)),
-        )
-    )
+    points = torch.from_numpy(texels.interpolate(mesh.vertices, mesh.triangles))
+    normals = torch.from_numpy(unit(texels.interpolate(mesh.normals, mesh.triangles)))
     open_share, _ = occlusion_factors(
-        MeshScene(mesh.vertices, mesh.faces),
+        MeshScene(mesh.vertices, mesh.triangles),
         points,
         normals,
         normals,
@@ -192,7 +148,7 @@ def bake_occlusion(mesh: UnwrappedMesh, size: int, offset: float) -> np.ndarray:
         n_specular_rays=1,
         offset=offset,
     )
-    values = Spread(texels.index, small)(open_share[:, 0].numpy())
+    values = open_share[:, 0].numpy()[nearest_rows(texels.index, small)]
     return np.clip(zoom(values, size / small, order=1, mode="nearest", grid_mode=True), 0, 1)
 
 
@@ -209,32 +165,15 @@ def to_tangent_space(world: np.ndarray, normals: np.ndarray, tangents: np.ndarra
     volume = (tangent * columns[:, 0]).sum(axis=1, keepdims=True)
     local = np.einsum("nij,nj->ni", columns, world) * np.where(volume < 0, -1, 1)
     local = np.where(np.abs(volume) > 1e-9, local, [0, 0, 1])
-    local = _unit(local)
+    local = unit(local)
     local[:, 2] = np.maximum(local[:, 2], MIN_UP)
-    return _unit(local).astype(np.float32)
+    return unit(local).astype(np.float32)
 
 
-class Spread:
-    """Makes maps from values at some texels; the others get the nearest value, so that mip maps show no seams.
-
-    Args:
-        index: [k] row * size + column of the texels that have values.
-        size: Texels along an edge.
-
-    Attributes:
-        rows: [size, size] which of the k values each texel has.
-    """
-
-    def __init__(self, index: np.ndarray, size: int):
-        row_of = np.full(size * size, -1, np.int32)
-        row_of[index] = np.arange(len(index), dtype=np.int32)
-        row_of = row_of.reshape(size, size)
-        self.rows = row_of[tuple(nearest_texels(row_of >= 0))]
-
-    def __call__(self, values: np.ndarray) -> np.ndarray:
-        """The map [size, size] or [size, size, c] float32 of values [k] or [k, c]."""
-        return values.astype(np.float32)[self.rows]
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
+def nearest_rows(index: np.ndarray, size: int) -> np.ndarray:
+    """[size, size] which of the values at texels `index` [k] (row * size + column) each texel has: those of the nearest one, so
+    that mip maps show no seams."""
+    row_of = np.full(size * size, -1, np.int32)
+    row_of[index] = np.arange(len(index), dtype=np.int32)
+    row_of = row_of.reshape(size, size)
+    return row_of[tuple(nearest_texels(row_of >= 0))]

@@ -33,7 +33,6 @@ def extract_mesh(
 
     Args:
         sdf: A function from points [n, 3] to signed distances [n], negative inside.
-        box: The half size of the cube, scene units.
         resolution: The number of nodes along an edge.
         dense: Whether to evaluate all nodes.
 

@@ -12,16 +12,14 @@ import torch
 import trimesh
 from torch import Tensor
 
+from splitnerf.data.images import linear_to_srgb, to_uint8, write_image
 from splitnerf.data.normalisation import transform_points
-from splitnerf.export.environment import write_environment
-from splitnerf.export.glb import write_glb
-from splitnerf.export.mesh import write_mesh_ply
 from splitnerf.export.meshing import extract_mesh
-from splitnerf.export.obj import write_obj
 from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_closed
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
-from splitnerf.export.usdz import require_usd, write_usdz
+from splitnerf.export.writers import require_usd, write_glb, write_obj, write_usdz
+from splitnerf.files import atomic_path
 from splitnerf.progress import Progress
 from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
 from splitnerf.render.seen import Cameras, seen_vertices
@@ -31,14 +29,9 @@ FORMATS = ("glb", "ply", "obj", "usdz")
 
 @dataclass(frozen=True)
 class Exported:
-    """The result of an export.
-
-    Attributes:
-        mesh: The mesh before decimation, in the data's world.
-        n_faces: The number of faces of the textured mesh; that of `mesh` where no format has textures.
-        watertight: Whether the mesh of `n_faces` is closed.
-        n_dropped: The number of removed floating or enclosed components.
-    """
+    """What was exported: the mesh before decimation, in the data's world; the number of faces of the textured mesh
+    (that of `mesh` where no format has textures) and whether it is closed; and the number of floating or enclosed
+    components that were removed."""
 
     mesh: trimesh.Trimesh
     n_faces: int
@@ -57,19 +50,15 @@ def write_assets(
     n_faces: int | None = None,
     texture_size: int | None = None,
 ) -> Exported:
-    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr.
+    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder.
 
     All files are in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the
-    extracted mesh with vertex colours. What no photo shows is a cap between its edges.
+    extracted mesh with vertex colours. What none of the photos' cameras sees is a cap between its edges.
 
     Args:
-        out: The folder.
-        model: The scene.
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
-        cameras: Those of the photos.
-        formats: The names of the formats, out of :data:`FORMATS`.
-        resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for the values of the group
-            `export`.
+        formats: Out of :data:`FORMATS`.
+        resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for those of the group `export`.
 
     Raises:
         EmptyMesh: The surface is empty.
@@ -92,7 +81,7 @@ def write_assets(
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
         exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
         if "ply" in formats:
-            write_mesh_ply(out / "mesh.ply", mesh.vertices, faces, surface_materials(surface, vertices)[0])
+            write_mesh_ply(out / "mesh.ply", mesh, surface_materials(surface, vertices)[0])
         if set(formats) - {"ply"}:
             textured = textured_asset(
                 "object",
@@ -119,6 +108,28 @@ def write_assets(
             exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
         write_environment(out, model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy())
     return exported
+
+
+def write_mesh_ply(path: Path, mesh: trimesh.Trimesh, albedo: np.ndarray | None = None) -> None:
+    """Writes a binary PLY atomically; albedo [n, 3], linear in [0, 1], is stored sRGB-encoded in 8 bit, as viewers
+    expect."""
+    colors = None if albedo is None else to_uint8(linear_to_srgb(albedo))
+    coloured = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=colors, process=False)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(coloured.export(file_type="ply"))
+
+
+def write_environment(folder: Path, radiance: np.ndarray) -> None:
+    """Writes `environment.exr` (half where the range allows, else float) and `environment.hdr`.
+
+    Args:
+        folder: The run's folder.
+        radiance: [H, W, 3] linear radiance, finite and >= 0, equirectangular: u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from
+            the top.
+    """
+    half = bool(radiance.max() <= np.finfo(np.float16).max)
+    write_image(folder / "environment.exr", radiance, half=half)
+    write_image(folder / "environment.hdr", radiance)
 
 
 def surface_of(model: SceneModel) -> Surface:

@@ -17,17 +17,11 @@ AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
 
 def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Removes connected components with less than 1 % of the largest one's faces, and the walls of cavities.
-
-    A cavity is a hollow inside the solid that nothing outside can see. Its wall faces inward, so that the volume that
-    the wall encloses is negative.
-
-    Args:
-        vertices: [n, 3].
-        faces: [m, 3], outward.
+    """Removes connected components with less than 1 % of the largest one's faces, and the walls of cavities, hollows
+    that nothing outside can see: a wall faces inward, so that the volume that it encloses is negative.
 
     Returns:
-        vertices, faces and the number of removed components.
+        vertices [n, 3], outward faces [m, 3] and the number of removed components.
     """
     n = len(vertices)
     edges = np.concatenate([faces[:, :2], faces[:, 1:]])
@@ -42,13 +36,8 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
 
 
 def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moves the vertices that are not seen on to a membrane between those seen: each into the middle of its neighbours.
-
-    A flat rim gets a flat cap. Components without seen vertices stay as they are.
-
-    Args:
-        vertices, faces: The mesh, [n, 3] and [m, 3].
-        seen: [n] bool.
+    """Moves the vertices [n, 3] that are not `seen` [n] on to a membrane between those seen: each into the middle of
+    its neighbours. A flat rim gets a flat cap. Components without seen vertices stay as they are.
 
     Returns:
         vertices [n, 3], and [n] bool, those that stay.
@@ -76,12 +65,8 @@ def is_closed(faces: np.ndarray) -> bool:
 
 
 def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Collapses edges by quadric error until about n_faces are left; tries several ways to keep a closed mesh closed.
-
-    Args:
-        vertices: [n, 3].
-        faces: [m, 3].
-        n_faces: The number of faces to keep; 0, or a number not below m, keeps all.
+    """Collapses edges by quadric error until about n_faces are left; tries several ways to keep a closed mesh closed. A
+    number of 0, or not below that of the faces, keeps all.
 
     Returns:
         vertices [k, 3] float32 and faces [l, 3] int32.

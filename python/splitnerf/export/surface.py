@@ -17,14 +17,9 @@ MIN_SLOPE = 0.2  # least slope of the field along a line; below it the point sto
 
 @dataclass(frozen=True)
 class Surface:
-    """A signed distance field with materials, in one frame. All functions take points [n, 3].
-
-    Attributes:
-        sdf: A function that returns signed distances [n], negative inside.
-        gradient: A function that returns signed distances [n] and their gradients [n, 3].
-        materials: A function that returns albedo [n, 3] linear, roughness [n, 1], metallic [n, 1] and unit normals [n,
-            3].
-    """
+    """A signed distance field with materials, in one frame: functions of points [n, 3] that give signed distances [n],
+    negative inside; the same and their gradients [n, 3]; and albedo [n, 3] linear, roughness [n, 1], metallic [n, 1]
+    and unit normals [n, 3]."""
 
     sdf: Callable[[Tensor], Tensor]
     gradient: Callable[[Tensor], tuple[Tensor, Tensor]]
@@ -40,11 +35,8 @@ def surface_normals(surface: Surface, points: np.ndarray) -> np.ndarray:
 
 @torch.no_grad()
 def surface_materials(surface: Surface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """albedo [n, 3], roughness [n], metallic [n] and normals [n, 3] float32 at [n, 3] points.
-
-    Raises:
-        RuntimeError: One of them is not finite.
-    """
+    """albedo [n, 3], roughness [n], metallic [n] and normals [n, 3] float32 at [n, 3] points. Raises RuntimeError where
+    one of them is not finite."""
     table = torch.cat([torch.cat(surface.materials(chunk), dim=1) for chunk in torch.from_numpy(points).split(CHUNK)])
     if not table.isfinite().all():
         raise RuntimeError("the materials are not finite: the training diverged")
@@ -56,20 +48,12 @@ def surface_materials(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
 def to_level_set(
     surface: Surface, points: np.ndarray, reach: float, directions: np.ndarray | None = None
 ) -> np.ndarray:
-    """Moves points along lines onto the zero level set where it is within reach.
+    """Moves points [n, 3] float32 along lines onto the zero level set where it is within reach, in the points' units;
+    unit directions [n, 3], None for the field's gradients.
 
     The first step treats the field's value as a distance; the others are secant steps. Each step is clamped to the
     reach. A point stops where the field hardly rises along the line. The result is the visited position with the
     smallest absolute value, so that no point ends farther from the surface than it began.
-
-    Args:
-        surface: The field.
-        points: [n, 3] float32.
-        reach: The largest distance that a point may move, in the points' units.
-        directions: [n, 3] unit directions of the lines; None uses the field's gradients.
-
-    Returns:
-        [n, 3] float32 moved points.
     """
     moved = []
     for rows in (slice(start, start + CHUNK) for start in range(0, len(points), CHUNK)):

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
+import xatlas
 from scipy.spatial import cKDTree
 
-from splitnerf.data.asset import Asset, Material
-from splitnerf.data.tangents import vertex_tangents
-from splitnerf.export.bake import UnwrappedMesh, bake
+from splitnerf.data.asset import Asset, vertex_tangents
+from splitnerf.devices import refuse_one_processor
+from splitnerf.export.bake import bake
 from splitnerf.export.simplify import decimate, is_closed
 from splitnerf.export.surface import Surface, surface_normals, to_level_set
-from splitnerf.export.unwrap import unwrap
 
+PADDING = 4  # texels between charts
+CHARTS = 64  # no chart has more than 1 / CHARTS of the surface: its time rises with the square of its faces
 MIN_AGREEMENT = 0.2  # least cosine between the field's and the faces' normal; below it the faces' normal is used
 
 
 @dataclass(frozen=True)
 class TexturedAsset:
-    """A mesh with baked textures.
-
-    Attributes:
-        asset: The mesh in the surface's frame, with albedo, roughness-metallic and normal textures.
-        occlusion: [h, w] texture in [0, 1], 1 = open.
-        watertight: Whether the mesh was closed before the charts cut it.
-    """
+    """An asset in the surface's frame with baked textures, its occlusion [h, w] in [0, 1], 1 = open, and whether the
+    mesh was closed before the charts cut it."""
 
     asset: Asset
     occlusion: np.ndarray
@@ -50,14 +47,12 @@ def textured_asset(
     """Decimates a mesh, moves its vertices back onto the surface, unwraps it and bakes its textures.
 
     Args:
-        name: The name of the asset.
         vertices, faces: The mesh, [n, 3] and [m, 3], in the surface's frame.
-        surface: The fields.
         n_faces: The number of faces to keep; 0 keeps all.
         texture_size: The number of texels along an edge.
-        spacing: The spacing of the grid that the mesh was extracted from, in the surface's units; vertices and texels
-            move by at most twice as much.
-        occlusion_offset: The distance of an occlusion ray's start from the mesh, in the surface's units.
+        spacing: The spacing of the grid that the mesh was extracted from; vertices and texels move by at most twice as
+            much.
+        occlusion_offset: The distance of an occlusion ray's start from the mesh, in the surface's units, as `spacing`.
         on_surface: [n] bool, the vertices that are of the zero level set. The others, a cap's, stay where they are,
             with the mesh's normals. None: all.
         tell: Called before each part with the share of the time that is used by then, about, and the part's name.
@@ -77,28 +72,20 @@ def textured_asset(
     tell(0.2, "texture coordinates")
     origins, faces, uv = unwrap(vertices, faces, texture_size)
     vertices, normals, on_surface = vertices[origins], normals[origins], on_surface[origins]
-    mesh = UnwrappedMesh(vertices, faces, normals, vertex_tangents(vertices, faces, normals, uv), uv)
-    tell(0.7, "textures")
-    maps = bake(mesh, surface, texture_size, reach=reach, offset=occlusion_offset, on_surface=on_surface)
-    material = Material(
-        name=name,
-        roughness=1.0,
-        metallic=1.0,
-        albedo_texture=maps.albedo,
-        roughness_metallic_texture=maps.roughness_metallic,
-        normal_texture=maps.normal,
-    )
     asset = Asset(
         name=name,
         vertices=vertices,
         triangles=faces,
         normals=normals,
         material_ids=np.zeros(len(faces), np.int32),
-        materials=[material],
         uv=uv,
-        tangents=mesh.tangents,
+        tangents=vertex_tangents(vertices, faces, normals, uv),
     )
-    return TexturedAsset(asset, maps.occlusion, watertight)
+    tell(0.7, "textures")
+    material, occlusion = bake(
+        asset, surface, texture_size, reach=reach, offset=occlusion_offset, on_surface=on_surface
+    )
+    return TexturedAsset(replace(asset, materials=[material]), occlusion, watertight)
 
 
 def vertex_normals(
@@ -112,3 +99,30 @@ def vertex_normals(
     known = np.linalg.norm(coarse, axis=1, keepdims=True) > 0.5
     fallback = np.where(known, coarse, np.float32([0, 0, 1]))
     return np.where(agree | (~known & (np.linalg.norm(fine, axis=1, keepdims=True) > 0.5)), fine, fallback)
+
+
+def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cuts a mesh, vertices [n, 3] float32 and faces [m, 3] int32, into charts and packs them into one square texture
+    of so many texels along an edge, without overlap.
+
+    Returns:
+        origins [k] int64, the vertex that each new one is a copy of; faces [m, 3] int32 of the new vertices; and uv [k,
+        2] float32 in [0, 1], (0, 0) the top left corner.
+
+    Raises:
+        InputError: The machine has one processor.
+    """
+    refuse_one_processor()
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(vertices, faces.astype(np.uint32))
+    options = xatlas.PackOptions()
+    options.resolution = texture_size
+    options.padding = 2 * PADDING  # the packed area is up to twice as large as requested
+    options.bilinear = True
+    charts = xatlas.ChartOptions()
+    charts.max_chart_area = float(trimesh.Trimesh(vertices, faces, process=False).area) / CHARTS
+    atlas.generate(charts, options)
+    origins, new_faces, uv = atlas[0]
+    texels = uv * [atlas.width, atlas.height]
+    uv = texels / max(atlas.width, atlas.height)
+    return origins.astype(np.int64), new_faces.astype(np.int32), uv.astype(np.float32)

@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, with_exposures
 from splitnerf.data.environment import read_environment
-from splitnerf.data.exposures import with_exposures
 from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average
@@ -23,9 +22,9 @@ from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import Reading
 from splitnerf.data.tensor_files import read_tensors, write_tensors
 from splitnerf.errors import InputError
-from splitnerf.export.bake import UnwrappedMesh, bake_occlusion
-from splitnerf.export.environment import write_environment
-from splitnerf.export.glb import write_glb
+from splitnerf.export.bake import bake_occlusion
+from splitnerf.export.scene import write_environment
+from splitnerf.export.writers import write_glb
 from splitnerf.files import locked
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.refinement.fit import FitSettings
@@ -63,9 +62,8 @@ def read_light(folder: Path) -> np.ndarray:
 
 def occlusion_texture(asset: Asset) -> np.ndarray:
     """[h, w] the open share of each texel's hemisphere, for viewers that trace no rays."""
-    mesh = UnwrappedMesh(asset.vertices, asset.triangles, asset.normals, asset.tangents, asset.uv)
     extent = float(np.ptp(asset.vertices, axis=0).max())
-    return bake_occlusion(mesh, asset.materials[0].albedo_texture.shape[0], OCCLUSION_OFFSET * extent)
+    return bake_occlusion(asset, asset.materials[0].albedo_texture.shape[0], OCCLUSION_OFFSET * extent)
 
 
 def source_of(run: Path) -> Path:

@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.lens import pixel_width
-from splitnerf.export.bake import Spread, Texels, rasterise
+from splitnerf.export.bake import Texels, nearest_rows, rasterise
 
 PATCH_PIXELS = 2.0  # width of a patch, in pixels of the photos
 MIN_COSINE = 1e-3  # of a shading normal and the direction to the viewer
@@ -88,8 +88,8 @@ class AssetTexels:
         self.asset, m = asset, asset.materials[0]
         self.size = m.albedo_texture.shape[0]
         covered = rasterise(asset.uv, asset.triangles, self.size)
-        self._spread = Spread(covered.index, self.size)
-        self._row_of = torch.from_numpy(self._spread.rows.reshape(-1).astype(np.int64))
+        self._nearest = nearest_rows(covered.index, self.size)
+        self._row_of = torch.from_numpy(self._nearest.reshape(-1).astype(np.int64))
         maps = [m.albedo_texture, m.roughness_metallic_texture, m.normal_texture]
         values = np.concatenate(maps, axis=2).reshape(-1, N_CHANNELS).astype(np.float32)
         self.index, self.chart = covered.index, charts(asset)[asset.triangles[covered.triangle, 0]]
@@ -104,7 +104,7 @@ class AssetTexels:
 
     def spread(self, values: Tensor) -> Tensor:
         """The image [h, w, c] of texels' values [m, c]; outside the charts that of the nearest inside."""
-        return torch.from_numpy(self._spread(values.numpy()))
+        return torch.from_numpy(values.numpy()[self._nearest])
 
     def maps(self, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Textures of values [m, 8]: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""

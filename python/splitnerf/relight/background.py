@@ -17,11 +17,8 @@ SUBPIXELS = 2
 
 
 class Background:
-    """One of "transparent", "white", "environment", or the path of an image that is scaled to fill and cropped.
-
-    Raises:
-        InputError: The image cannot be read.
-    """
+    """One of "transparent", "white", "environment", or the path of an image that is scaled to fill and cropped. Raises
+    InputError where the image cannot be read."""
 
     def __init__(self, text: str):
         self.transparent = text == TRANSPARENT
@@ -31,13 +28,8 @@ class Background:
             self._plate = read_plate(Path(text))
 
     def behind(self, view: View, environment: np.ndarray, exposure: float) -> np.ndarray | None:
-        """Linear radiance [height, width, 3] behind the object, None where it is transparent.
-
-        Args:
-            view: The camera.
-            environment: [h, w, 3] linear radiance of the light in this view.
-            exposure: Factor on the light; white and images stay as they are.
-        """
+        """Linear radiance [height, width, 3] behind the object, None where it is transparent; the exposure is a factor
+        on the light [h, w, 3] in this view, white and images stay as they are."""
         if self.transparent:
             return None
         if self.environment:
@@ -49,10 +41,7 @@ class Background:
 
 def read_plate(path: Path) -> np.ndarray:
     """Reads a background image as [h, w, 3] linear; files of 8 and 16 bits are decoded from sRGB and laid over white.
-
-    Raises:
-        InputError: It cannot be read.
-    """
+    Raises InputError where it cannot be read."""
     if read_header(path).bits == 32:
         return np.maximum(read_radiance(path), 0)
     pixels = decoded(read_colours(path))
@@ -87,13 +76,11 @@ def environment_behind(view: View, environment: np.ndarray) -> np.ndarray:
 
 
 def compose(images: dict[str, np.ndarray], behind: np.ndarray | None, exposure: float) -> np.ndarray:
-    """Puts a rendering over its background, in linear light.
+    """Puts a rendering over its background [h, w, 3], in linear light; None for no background.
 
     Args:
-        images: `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity
-            of its black shadow, alpha + shadow <= 1; see `AssetRenderer.render`.
-        behind: [h, w, 3] linear background, or None.
-        exposure: Factor on the rendering.
+        images: `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity of
+            its black shadow, alpha + shadow <= 1; see `AssetRenderer.render`.
 
     Returns:
         [h, w, 4] float32, linear, premultiplied: exposure * radiance + (1 - alpha - shadow) * behind, alpha 1; without

@@ -24,14 +24,9 @@ FRONT_AZIMUTH = -90.0  # glTF's front, +z of the file, is -y here
 
 @dataclass(frozen=True)
 class View:
-    """One picture to take.
-
-    Attributes:
-        pose: [4, 4] float64 camera-to-world, OpenGL axes.
-        intrinsics: (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
-        width, height: Pixels.
-        light_degrees: The rotation of the light about z in degrees, counter-clockwise seen from above.
-    """
+    """One picture to take: a pose [4, 4] float64 camera-to-world, OpenGL axes, (fx, fy, cx, cy) in pixels, pixel
+    centres at +0.5, the size in pixels, and the rotation of the light about z in degrees, counter-clockwise seen from
+    above."""
 
     pose: np.ndarray
     intrinsics: tuple[float, float, float, float]
@@ -41,11 +36,8 @@ class View:
 
 
 def parse_size(text: str) -> tuple[int, int | None]:
-    """(width, height or None) of "W" or "WxH".
-
-    Raises:
-        InputError: The text has another form, or a side is below 1 or above 16384.
-    """
+    """(width, height or None) of "W" or "WxH". Raises InputError where the text has another form, or a side is below 1
+    or above 16384."""
     parts = text.lower().split("x")
     digits = all(part.isascii() and part.isdigit() and len(part) < 10 for part in parts)
     if len(parts) > 2 or not digits or not all(1 <= int(part) <= LARGEST_PICTURE for part in parts):
@@ -63,17 +55,13 @@ def bounding_sphere(asset: Asset) -> tuple[np.ndarray, float]:
 def turntable(
     asset: Asset, count: int, *, elevation: float = 20.0, rotate: str = "camera", size: tuple[int, int | None] | None
 ) -> list[View]:
-    """Cameras on a circle around the object; its bounding sphere fills the picture except for a margin of 10 %.
+    """Cameras on a circle around the object, the first in front; its bounding sphere fills the picture except for a
+    margin of 10 %.
 
     Args:
-        asset: The object.
-        count: The number of pictures in a full turn, at least 1; the first shows the front.
         elevation: The elevation of the camera above the horizon, degrees in (-90, 90).
         rotate: "camera", or "light" to keep the camera and turn the light, counter-clockwise seen from above.
         size: The result of `parse_size`; without a height the picture is square, and None means 512x512.
-
-    Returns:
-        `count` views.
 
     Raises:
         InputError: The count or the elevation is out of range.
@@ -107,11 +95,8 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
 
 
 def data_views(root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()) -> list[View]:
-    """The cameras of a data set's split, in the data's world; each image's size is the default.
-
-    Raises:
-        InputError: The data cannot be used, or the size has another shape than the images.
-    """
+    """The cameras of a data set's split, in the data's world; each image's size is the default. Raises InputError where
+    the data cannot be used, or the size has another shape than the images."""
     if not root.is_dir():
         raise InputError(f"{root}: no such folder; give the folder of a data set")
     frames, _ = read_frames(root, split, reading)
@@ -126,10 +111,7 @@ def data_views(root: Path, split: str, size: tuple[int, int | None] | None, read
 
 def path_views(path: Path, size: tuple[int, int | None] | None) -> list[View]:
     """The cameras of a file in the form of transforms.json; its `w` and `h`, else 512x512, unless a size is given.
-
-    Raises:
-        InputError: The file cannot be used, or the size has another shape than its `w` and `h`.
-    """
+    Raises InputError where the file cannot be used, or the size has another shape than its `w` and `h`."""
     views, cameras = [], read_camera_path(path)
     if len(cameras) > MOST_VIEWS:
         raise InputError(f"{path}: has {len(cameras)} cameras, more than {MOST_VIEWS}; split it")

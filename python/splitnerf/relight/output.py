@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from splitnerf.data.frames import refuse_data
-from splitnerf.data.images import is_written_here, linear_to_srgb, to_uint8, write_image
+from splitnerf.data.images import is_written_here, linear_to_srgb, straight_srgb, to_uint8, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
 
@@ -31,11 +31,8 @@ def own_files(folder: Path) -> set[str]:
 
 
 def check_folder(folder: Path, names: list[str], *, overwrite: bool) -> set[str]:
-    """The files of an earlier call in a folder, which files of these names would replace.
-
-    Raises:
-        InputError: There are some and `overwrite` is false, or a file of one of the names is from another program.
-    """
+    """The files of an earlier call in a folder, which files of these names would replace. Raises InputError where there
+    are some and `overwrite` is false, or a file of one of the names is from another program."""
     refuse_data(folder)
     own = own_files(folder)
     if own and not overwrite:
@@ -47,25 +44,13 @@ def check_folder(folder: Path, names: list[str], *, overwrite: bool) -> set[str]
 
 
 def write_frame(folder: Path, index: int, linear: np.ndarray, *, with_alpha: bool) -> None:
-    """Writes NNN.exr (linear, half, alpha associated) and NNN.png (sRGB, alpha straight), each atomically.
-
-    Args:
-        folder: Made where it is missing.
-        index: The frame's number.
-        linear: [h, w, 4] float32, premultiplied.
-        with_alpha: Whether alpha is written.
-    """
+    """Writes NNN.exr (linear, half, alpha associated) and NNN.png (sRGB, alpha straight), each atomically, of a picture
+    [h, w, 4] float32, linear, premultiplied; without alpha where it is not asked for."""
     channels = 4 if with_alpha else 3
     stored = np.minimum(linear[..., :channels], np.finfo(np.float16).max)
     write_image(folder / f"{index:03d}.exr", stored, half=True)
-    write_image(folder / f"{index:03d}.png", straight_srgb(linear)[..., :channels])
-
-
-def straight_srgb(linear: np.ndarray) -> np.ndarray:
-    """[..., 4] sRGB with straight alpha, colours clipped to [0, 1], from linear premultiplied ones; 0 where clear."""
-    alpha = linear[..., 3:]
-    straight = np.where(alpha > 0, linear[..., :3] / np.maximum(alpha, 1e-8), 0)
-    return np.concatenate([linear_to_srgb(np.clip(straight, 0, 1)), alpha], axis=-1).astype(np.float32)
+    straight = np.dstack([straight_srgb(linear[..., :3], linear[..., 3]), linear[..., 3]])
+    write_image(folder / f"{index:03d}.png", straight[..., :channels])
 
 
 def display_frame(linear: np.ndarray) -> np.ndarray:
@@ -75,13 +60,8 @@ def display_frame(linear: np.ndarray) -> np.ndarray:
 
 
 def write_gif(path: Path, frames: list[np.ndarray], fps: float) -> None:
-    """Writes an endless GIF atomically, each frame with its own 256 colours.
-
-    Args:
-        path: The file.
-        frames: Each [h, w, 3] uint8.
-        fps: Pictures a second; the format counts hundredths of a second.
-    """
+    """Writes an endless GIF of frames [h, w, 3] uint8 atomically, each with its own 256 colours; the format counts
+    hundredths of a second."""
     pictures = [Image.fromarray(frame).quantize(256, dither=Image.Dither.FLOYDSTEINBERG) for frame in frames]
     milliseconds = max(20, round(100 / fps) * 10)
     with atomic_path(path) as temporary:
@@ -91,11 +71,7 @@ def write_gif(path: Path, frames: list[np.ndarray], fps: float) -> None:
 
 
 def require_ffmpeg() -> None:
-    """Checks that MP4 can be written.
-
-    Raises:
-        InputError: The optional package is missing.
-    """
+    """Checks that MP4 can be written. Raises InputError where the optional package is missing."""
     try:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
@@ -103,16 +79,8 @@ def require_ffmpeg() -> None:
 
 
 def write_mp4(path: Path, frames: list[np.ndarray], fps: float) -> None:
-    """Writes an H.264 video atomically; an odd last row or column is dropped, the codec takes even sizes only.
-
-    Args:
-        path: The file.
-        frames: Each [h, w, 3] uint8, at least 2x2.
-        fps: Pictures a second.
-
-    Raises:
-        OSError: ffmpeg cannot write it.
-    """
+    """Writes an H.264 video of frames [h, w, 3] uint8 atomically; an odd last row or column is dropped, the codec takes
+    even sizes only. Raises OSError where ffmpeg cannot write it."""
     import imageio_ffmpeg
 
     height, width = (side - side % 2 for side in frames[0].shape[:2])

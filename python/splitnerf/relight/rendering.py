@@ -61,11 +61,7 @@ class Settings:
 
 
 def asset_of(path: Path) -> Asset:
-    """The asset of a run's folder or of a glTF file.
-
-    Raises:
-        InputError: There is none, or it cannot be read.
-    """
+    """The asset of a run's folder or of a glTF file. Raises InputError where there is none, or it cannot be read."""
     if path.is_dir():
         if not (path / "mesh.glb").is_file():
             raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
@@ -82,15 +78,8 @@ def relight(
     *,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Renders an asset under environment maps into NNN.png and NNN.exr and, if requested, GIF or MP4.
-
-    Args:
-        source: A run's folder or a glTF file.
-        maps: The environment maps; with several maps, each gets a folder with its name below `out`.
-        views_of: The views of the asset, at least one.
-        out: The folder.
-        settings: How to render and write the pictures.
-        overwrite: Whether to replace existing frames.
+    """Renders a run's asset or a glTF file under environment maps into NNN.png and NNN.exr and, if requested, GIF or
+    MP4; with several maps, each has a folder with its name below `out`.
 
     Returns:
         The folder of each map.

@@ -11,8 +11,8 @@ from torch import Tensor
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, dataset_fingerprint
 from splitnerf.devices import let_segments_grow, same_bits
+from splitnerf.errors import note_once
 from splitnerf.fields import EvaluatedLight
-from splitnerf.notes import note_once
 from splitnerf.refinement.refine import STATE
 from splitnerf.render.averages import training_photos
 from splitnerf.render.model import SceneModel

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from splitnerf.devices import pinned, start_fetching
+from splitnerf.errors import note
 from splitnerf.fields import EvaluatedLight
-from splitnerf.notes import note
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid

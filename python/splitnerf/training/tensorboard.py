@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from splitnerf.data.images import read_image
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note
 from splitnerf.files import reason
-from splitnerf.notes import note
 from splitnerf.training.observer import Event
 
 if TYPE_CHECKING:

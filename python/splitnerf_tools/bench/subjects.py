@@ -14,8 +14,8 @@ import numpy as np
 import torch
 import trimesh
 from splitnerf.data.environment import read_environment
+from splitnerf.errors import note
 from splitnerf.fields import LightPyramid
-from splitnerf.notes import note
 from torch import Tensor
 from torch.nn import functional as F
 

@@ -13,12 +13,11 @@ import numpy as np
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_header, to_uint8
 from splitnerf.data.layouts.frame import OPENCV_AXES
-from splitnerf.data.masks import read_mask
 from splitnerf.data.normalisation import transform_points
+from splitnerf.data.photos import read_mask
 from splitnerf.data.pixels import decoded
 from splitnerf.data.reading import Reading
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.errors import InputError, note
 
 from splitnerf_tools.capture.photographs import Photograph
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort

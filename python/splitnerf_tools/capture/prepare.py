@@ -15,9 +15,8 @@ from PIL import Image
 from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.json_files import write_json
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note
 from splitnerf.files import LOCK, atomic_path, locked, remove_partial
-from splitnerf.notes import note
 
 from splitnerf_tools.capture.masks import find_masks, given_masks, mask_files
 from splitnerf_tools.capture.page import write_page

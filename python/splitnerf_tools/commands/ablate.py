@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE, INTERRUPTED
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, INTERRUPTED, examples
 from splitnerf.cli.train import budget
 from splitnerf.errors import InputError
 

@@ -8,9 +8,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from splitnerf.cli.exit_codes import DONE, FAILED, INTERRUPTED
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options
+from splitnerf.cli.common import DONE, FAILED, INTERRUPTED, add_reading_options, examples
 from splitnerf.cli.train import add_training_options, settings_of
 from splitnerf.errors import InputError, escaped
 

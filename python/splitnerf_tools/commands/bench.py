@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
+from splitnerf.cli.common import DONE
 
 # Modules of splitnerf_tools.bench, each with run(quick, rounds), and what they compare.
 BENCHMARKS = {

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import splitnerf
-from splitnerf.cli.exit_codes import DONE, FAILED
+from splitnerf.cli.common import DONE, FAILED
 
 from splitnerf_tools.findings import show
 

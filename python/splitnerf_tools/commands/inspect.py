@@ -5,9 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
-from splitnerf.cli.reading import add_reading_options, reading_of
+from splitnerf.cli.common import DONE, add_reading_options, examples, reading_of
 from splitnerf.errors import InputError
 
 PAGE = "inspect.html"

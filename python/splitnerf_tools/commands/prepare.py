@@ -6,8 +6,7 @@ import argparse
 from importlib.util import find_spec
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
 PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}

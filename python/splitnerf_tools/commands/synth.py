@@ -6,8 +6,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
 LAYOUTS = ("blender", "nerfactor", "tensoir", "shiny", "stanford-orb", "neus")
@@ -65,7 +64,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from splitnerf.export.glb import write_glb
+    from splitnerf.export.writers import write_glb
 
     from splitnerf_tools.synth.rendering import SynthSettings, synthesise
     from splitnerf_tools.synth.shapes import shape_asset

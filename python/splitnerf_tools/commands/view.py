@@ -8,8 +8,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from splitnerf.cli.exit_codes import DONE
-from splitnerf.cli.help import examples
+from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
 LOCAL = "127.0.0.1"

@@ -12,8 +12,7 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import over_background
 from splitnerf.data.truth import load_scene_truth
-from splitnerf.evaluate.asset import asset_predictions
-from splitnerf.evaluate.scoring import Evaluated
+from splitnerf.evaluate.scoring import Evaluated, asset_predictions
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.pipeline import REPORT_VIEWS

@@ -13,8 +13,7 @@ from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.photos import resized_mask, separated_mask
 from splitnerf.data.reading import SEPARATION
-from splitnerf.errors import InputError
-from splitnerf.notes import note_once
+from splitnerf.errors import InputError, note_once
 from splitnerf.progress import Progress, ended_by_signals, tracked
 
 from splitnerf_tools.separation.field import RadianceField

@@ -12,10 +12,9 @@ import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment, turn_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.relit import PREFIX
-from splitnerf.errors import InputError
+from splitnerf.data.truth import PREFIX
+from splitnerf.errors import InputError, note
 from splitnerf.files import LOCK, locked
-from splitnerf.notes import note
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from tqdm import tqdm
 

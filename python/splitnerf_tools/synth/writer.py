@@ -18,11 +18,12 @@ import abc
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.layouts import view_folders
-from splitnerf.data.relit import PREFIX, relit_path
-from splitnerf.export.mesh import write_mesh_ply
+from splitnerf.data.truth import PREFIX, relit_path
+from splitnerf.export.scene import write_mesh_ply
 
 FULL_TRUTH = ("blender", "nerfactor", "tensoir")
 Maps = dict[str, np.ndarray]
@@ -63,7 +64,7 @@ class ViewWriter(abc.ABC):
 
     def mesh(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
         """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""
-        write_mesh_ply(self.root / "mesh.ply", vertices, triangles)
+        write_mesh_ply(self.root / "mesh.ply", trimesh.Trimesh(vertices, triangles, process=False))
 
     @abc.abstractmethod
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:

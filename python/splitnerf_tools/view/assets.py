@@ -19,9 +19,8 @@ from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import check_files, load_photo
 from splitnerf.data.pixels import decoded
 from splitnerf.data.reading import Reading
-from splitnerf.errors import InputError, plain
+from splitnerf.errors import InputError, note, plain
 from splitnerf.files import reason
-from splitnerf.notes import note
 
 from splitnerf_tools.report.embedding import camera_of
 

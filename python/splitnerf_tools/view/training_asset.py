@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.normalisation import transform_points
-from splitnerf.export.glb import glb_content
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.scene import surface_of
 from splitnerf.export.surface import surface_materials
+from splitnerf.export.writers import glb_content
 from splitnerf.render.model import SceneModel
 
 RESOLUTION = 128  # nodes along an edge of the box

@@ -21,12 +21,7 @@ LEAST_VALUES, MOST_VALUES, VALUES_PER_BYTE = 1 << 22, 1 << 30, 4096
 
 
 class Document:
-    """A parsed glTF file.
-
-    Attributes:
-        path: The file.
-        json: Its JSON, a dict with "asset".
-    """
+    """A parsed glTF file; `json` is a dict with "asset"."""
 
     def __init__(self, path: Path):
         """Reads the JSON and, of a GLB, the binary chunk.
@@ -54,11 +49,8 @@ class Document:
         self._earn(len(data))
 
     def spend(self, n_values: int) -> None:
-        """Counts numbers before they are unpacked, since few bytes can expand to very many numbers.
-
-        Raises:
-            InputError: The total is larger than files of this size can hold.
-        """
+        """Counts numbers before they are unpacked, since few bytes can expand to very many numbers. Raises InputError
+        where the total is larger than files of this size can hold."""
         self._left -= n_values
         if self._left < 0:
             raise InputError(f"{self.path}: unpacks to more than its size makes likely; export it again, smaller")
@@ -68,17 +60,8 @@ class Document:
         return self.json.get(name, [])
 
     def array(self, index: int) -> np.ndarray:
-        """Decodes one accessor.
-
-        Args:
-            index: The accessor's index.
-
-        Returns:
-            [count, components], float64 where the file stores floats or normalised integers, else int64.
-
-        Raises:
-            InputError: The accessor reaches beyond its buffer, or a file is missing.
-        """
+        """Decodes one accessor as [count, components], float64 where the file stores floats or normalised integers,
+        else int64. Raises InputError where the accessor reaches beyond its buffer, or a file is missing."""
         accessor = self.json["accessors"][index]
         dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
         count = accessor["count"]

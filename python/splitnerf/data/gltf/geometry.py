@@ -8,24 +8,16 @@ import numpy as np
 import trimesh
 
 from splitnerf.data.gltf.document import Document
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.errors import InputError, note
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
 @dataclass
 class Part:
-    """One primitive as placed by one node, in the file's world.
-
-    Attributes:
-        vertices, normals: [n, 3] float64.
-        triangles: [m, 3] int64.
-        tangents: [n, 4] or None.
-        colors: [n, 3] linear, or None.
-        uv: TEXCOORD_N by N, each [n, 2].
-        material: Index, or None for glTF's default.
-    """
+    """One primitive as placed by one node, in the file's world: vertices, normals [n, 3] float64, triangles [m, 3],
+    tangents [n, 4] or None, linear colors [n, 3] or None, TEXCOORD_N [n, 2] by N, and the material's index, None for
+    glTF's default."""
 
     vertices: np.ndarray
     triangles: np.ndarray
@@ -37,11 +29,8 @@ class Part:
 
 
 def scene_parts(document: Document) -> list[Part]:
-    """All triangles of the file's scene, instances repeated.
-
-    Raises:
-        InputError: Damaged geometry or a node that contains itself.
-    """
+    """All triangles of the file's scene, instances repeated. Raises InputError where geometry is damaged, or
+    a node contains itself."""
     matrices = _world_matrices(document)
     parts, others = [], False
     for index, matrix in matrices.items():
@@ -188,7 +177,7 @@ def _read_part(document: Document, label: str, primitive: dict, placement: np.nd
         normals = (np.linalg.inv(linear).transpose(0, 2, 1) @ arrays["NORMAL"][:, :, None])[:, :, 0]
         normals = _unit_or_geometric(label, normals, vertices, triangles)
     else:
-        normals = np.repeat(_unit(_crosses(vertices, triangles)), 3, axis=0)[_inverse(triangles)]
+        normals = np.repeat(_unit(_crosses(vertices, triangles)), 3, axis=0)
     tangents = None
     if "TANGENT" in arrays:
         along = (linear @ arrays["TANGENT"][:, :3, None])[:, :, 0]
@@ -215,13 +204,6 @@ def _triangles(label: str, indices: np.ndarray, mode: int) -> np.ndarray:
 def _crosses(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
-
-
-def _inverse(triangles: np.ndarray) -> np.ndarray:
-    """The corner that names each vertex, where each vertex is named exactly once."""
-    corners = np.empty(triangles.size, dtype=np.int64)
-    corners[triangles.reshape(-1)] = np.arange(triangles.size)
-    return corners
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

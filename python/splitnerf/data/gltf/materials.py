@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from splitnerf.data.asset import Material
 from splitnerf.data.gltf.document import Document
 from splitnerf.data.images import decode_image, srgb_to_linear
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.errors import InputError, note
 
 SUPPORTED_EXTENSIONS = frozenset(
     {"KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_emissive_strength", "EXT_texture_webp"}
@@ -20,43 +18,19 @@ REPEAT = 10497
 LARGEST_FACTOR = 1e9
 
 
-@dataclass
-class TexturedMaterial:
-    """A material, and how its textures' coordinates come from the mesh.
-
-    Attributes:
-        material: See `Asset`.
-        uv_set: N of TEXCOORD_N, or None without textures.
-        uv_transform: [3, 3] on (u, v, 1), KHR_texture_transform.
-    """
-
-    material: Material
-    uv_set: int | None
-    uv_transform: np.ndarray
-
-
-def read_material(document: Document, index: int | None) -> TexturedMaterial:
-    """Reads one material.
-
-    Args:
-        document: The file.
-        index: The material's index; None means glTF's default material (white, rough, metallic).
-
-    Returns:
-        The material; alpha and occlusion are left out.
-
-    Raises:
-        InputError: An image cannot be read, or the textures need more than one set of coordinates.
+def read_material(document: Document, index: int | None) -> tuple[Material, TextureSlots]:
+    """Reads one material, alpha and occlusion left out, and where its textures lie; index None means glTF's default material (white, rough,
+    metallic). Raises InputError where an image cannot be read, or the textures need more than one set of coordinates.
     """
     if index is None:
         note(f"{document.path}: a mesh has no material; drawn as glTF's default, white, roughness 1, metallic 1")
-        return TexturedMaterial(Material(name="default", metallic=1.0), None, np.eye(3))
+        return Material(name="default", metallic=1.0), TextureSlots(document, "default")
     source = document.json["materials"][index]
     name = source.get("name", f"material {index}")
     pbr = source.get("pbrMetallicRoughness", {})
     if source.get("alphaMode", "OPAQUE") != "OPAQUE":
         note(f"{document.path}: material '{name}' is transparent (alphaMode {source['alphaMode']}); drawn opaque")
-    slots = _Slots(document, name)
+    slots = TextureSlots(document, name)
     # Each texture takes its last form before the next one is read: a large one has several forms in memory at a time.
     albedo, emission = (
         None if pixels is None else srgb_to_linear(pixels)
@@ -85,11 +59,12 @@ def read_material(document: Document, index: int | None) -> TexturedMaterial:
         normal_texture=normal,
         emission_texture=emission,
     )
-    return TexturedMaterial(material, slots.uv_set, slots.uv_transform)
+    return material, slots
 
 
-class _Slots:
-    """Reads a material's textures and checks that all of them use the same coordinates."""
+class TextureSlots:
+    """Reads a material's textures and checks that all of them use the same coordinates: TEXCOORD_N for N `uv_set` (None: there is
+    no texture), times `uv_transform` [3, 3] on (u, v, 1), of KHR_texture_transform."""
 
     def __init__(self, document: Document, name: str):
         self.document, self.name = document, name

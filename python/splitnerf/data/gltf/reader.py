@@ -7,32 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.asset import Asset
+from splitnerf.data.asset import Asset, Material, vertex_tangents
 from splitnerf.data.gltf.document import Document
 from splitnerf.data.gltf.geometry import Part, scene_parts, split_mirrored
-from splitnerf.data.gltf.materials import SUPPORTED_EXTENSIONS, TexturedMaterial, read_material
-from splitnerf.data.tangents import vertex_tangents
-from splitnerf.errors import InputError
-from splitnerf.notes import note
+from splitnerf.data.gltf.materials import SUPPORTED_EXTENSIONS, TextureSlots, read_material
+from splitnerf.errors import InputError, note
 
 FARTHEST = 1e12  # coordinates; the tracer's products of two stay finite
 
 
 def read_asset(path: str | os.PathLike) -> Asset:
-    """Reads a glTF 2.0 file: all primitives of its scene as one mesh, y up turned to z up, (x, y, z) -> (x, -z, y).
-
-    A note on stderr names features of the file that the program does not draw (transparency, animation, unknown
-    extensions).
-
-    Args:
-        path: A .glb, or a .gltf with its files beside it.
-
-    Returns:
-        The mesh with its materials.
-
-    Raises:
-        InputError: The file cannot be read or drawn.
-    """
+    """Reads a glTF 2.0 file, .glb or .gltf with its files beside it: all primitives of its scene as one mesh, y up
+    turned to z up, (x, y, z) -> (x, -z, y). Notes on stderr name features that are not drawn (transparency, animation,
+    unknown extensions). Raises InputError where the file cannot be read or drawn."""
     path = Path(path)
     document = Document(path)
     try:
@@ -55,10 +42,10 @@ def _read(document: Document) -> Asset:
     parts = scene_parts(document)
     indices = list(dict.fromkeys(part.material for part in parts))
     materials = {index: read_material(document, index) for index in indices}
-    uvs = [_uv(path, part, materials[part.material]) for part in parts]
-    with_normal_map = any(entry.material.normal_texture is not None for entry in materials.values())
+    uvs = [_uv(path, part, *materials[part.material]) for part in parts]
+    with_normal_map = any(material.normal_texture is not None for material, _ in materials.values())
     for i, (part, uv) in enumerate(zip(parts, uvs)):
-        if part.tangents is None and materials[part.material].material.normal_texture is not None:
+        if part.tangents is None and materials[part.material][0].normal_texture is not None:
             parts[i], uvs[i] = split_mirrored(part, uv)
 
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
@@ -75,7 +62,7 @@ def _read(document: Document) -> Asset:
         triangles=np.concatenate([p.triangles + start for p, start in zip(parts, starts)]).astype(np.int32),
         normals=_z_up(np.concatenate([part.normals for part in parts])),
         material_ids=np.repeat([indices.index(part.material) for part in parts], counts).astype(np.int32),
-        materials=[materials[index].material for index in indices],
+        materials=[materials[index][0] for index in indices],
         uv=None if uv is None else uv.astype(np.float32),
         tangents=_z_up(np.concatenate([_tangents(p, c) for p, c in zip(parts, uvs)])) if with_normal_map else None,
         colors=None if colors is None else colors.astype(np.float32),
@@ -91,16 +78,16 @@ def _read(document: Document) -> Asset:
     return asset
 
 
-def _uv(path: Path, part: Part, textured: TexturedMaterial) -> np.ndarray | None:
+def _uv(path: Path, part: Part, material: Material, slots: TextureSlots) -> np.ndarray | None:
     """[n, 2] where the part's material has textures."""
-    if textured.uv_set is None:
+    if slots.uv_set is None:
         return None
-    if textured.uv_set not in part.uv:
+    if slots.uv_set not in part.uv:
         raise InputError(
-            f"{path}: material '{textured.material.name}' has textures, but a mesh with it has no "
-            f"TEXCOORD_{textured.uv_set}; unwrap it and export again"
+            f"{path}: material '{material.name}' has textures, but a mesh with it has no "
+            f"TEXCOORD_{slots.uv_set}; unwrap it and export again"
         )
-    return part.uv[textured.uv_set] @ textured.uv_transform[:2, :2].T + textured.uv_transform[:2, 2]
+    return part.uv[slots.uv_set] @ slots.uv_transform[:2, :2].T + slots.uv_transform[:2, 2]
 
 
 def _tangents(part: Part, uv: np.ndarray | None) -> np.ndarray:

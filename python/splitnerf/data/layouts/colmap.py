@@ -21,28 +21,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, listed_image
-from splitnerf.data.lens import MODELS, read_lens
-from splitnerf.errors import InputError
+from splitnerf.data.lens import MODELS, PARAMETERS, read_lens
+from splitnerf.errors import InputError, note_once
 from splitnerf.files import is_file
-from splitnerf.notes import note_once
 
 PLACES = ("sparse", "colmap/sparse")
 IMAGES, MASKS = "images", "masks"
-PARAMETERS = {
-    "SIMPLE_PINHOLE": "fl_x cx cy",
-    "PINHOLE": "fl_x fl_y cx cy",
-    "SIMPLE_RADIAL": "fl_x cx cy k1",
-    "RADIAL": "fl_x cx cy k1 k2",
-    "OPENCV": "fl_x fl_y cx cy k1 k2 p1 p2",
-    "OPENCV_FISHEYE": "fl_x fl_y cx cy k1 k2 k3 k4",
-    "FULL_OPENCV": "",
-    "FOV": "",
-    "SIMPLE_RADIAL_FISHEYE": "fl_x cx cy k1",
-    "RADIAL_FISHEYE": "fl_x cx cy k1 k2",
-    "THIN_PRISM_FISHEYE": "",
-    "RAD_TAN_THIN_PRISM_FISHEYE": "",
-}
-"""The parameters of the camera models by a transforms file's names, in the order of COLMAP's numbers; "" is not read."""
 POINT_BYTES = 24  # of an image point: x, y and the number of its 3D point
 LONGEST_NAME = 4096  # bytes
 Image = tuple[str, int, tuple[float, ...]]  # name, camera, quaternion (w first) and translation of world to camera
@@ -59,11 +43,7 @@ def splits(root: Path) -> None:
 
 
 def read(root: Path, split: None = None) -> list[Frame]:
-    """The registered images, by name.
-
-    Raises:
-        InputError: The model or an image cannot be used.
-    """
+    """The registered images, by name. Raises InputError where the model or an image cannot be used."""
     cameras_file, source = _model_files(root)
     with _opened(cameras_file) as file:
         cameras = {number: _lens_numbers(*camera, cameras_file) for number, *camera in _cameras(file)}

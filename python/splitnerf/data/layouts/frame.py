@@ -11,9 +11,8 @@ import numpy as np
 
 from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
 from splitnerf.data.lens import Distortion
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 from splitnerf.files import is_file
-from splitnerf.notes import note_once
 
 RIGID_TOLERANCE = 1e-3
 ROUNDED = 5e-3  # largest entry of R^T R - 1 of a rotation R whose entries have three decimals
@@ -55,11 +54,8 @@ class Frame:
 
 
 def checked_pose(matrix: object, name: str) -> np.ndarray:
-    """[4, 4] float64 of what a file gives as a camera-to-world matrix, called `name` in messages.
-
-    Raises:
-        InputError: It is not a rigid motion of finite numbers.
-    """
+    """[4, 4] float64 of what a file gives as a camera-to-world matrix, called `name` in messages. Raises InputError
+    where it is not a rigid motion of finite numbers."""
     try:
         pose = np.array(matrix, dtype=np.float64)
     except (ValueError, TypeError, OverflowError):
@@ -80,11 +76,8 @@ def checked_pose(matrix: object, name: str) -> np.ndarray:
 
 
 def folder_name(name: object, what: str) -> str:
-    """A name of one folder that a file gives, called `what` in messages.
-
-    Raises:
-        InputError: It is none, or leads elsewhere.
-    """
+    """A name of one folder that a file gives, called `what` in messages. Raises InputError where it is none, or leads
+    elsewhere."""
     if not isinstance(name, str) or name in ("", ".", "..") or set(name) & set("/\\\0"):
         raise InputError(f"{what} is no folder's name: {str(name)[:40]!r}; repair it")
     return name
@@ -100,11 +93,8 @@ def listed_file(folder: Path, name: str, source: Path) -> Path:
 
 
 def listed_image(folder: Path, name: str, source: Path) -> Path:
-    """The image that `source` lists relative to `folder`, perhaps without its suffix.
-
-    Raises:
-        InputError: There is no such regular file.
-    """
+    """The image that `source` lists relative to `folder`, perhaps without its suffix. Raises InputError where there is
+    no such regular file."""
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
     for suffix in ("", *suffixes):
         if any(is_file(folder / form) for form in _forms(f"{name}{suffix}")):

@@ -36,11 +36,8 @@ def splits(root: Path) -> None:
 
 
 def read(root: Path, split: None = None) -> list[Frame]:
-    """All frames, by name.
-
-    Raises:
-        InputError: A file cannot be used, or the numbers of cameras, images and masks differ.
-    """
+    """All frames, by name. Raises InputError where a file cannot be used, or the numbers of cameras, images and masks
+    differ."""
     matrices = read_matrices(root / CAMERAS)
     images, masks = _pictures(root / IMAGES), _pictures(root / MASKS)
     for folder, found in ((IMAGES, images), (MASKS, masks)):
@@ -67,11 +64,8 @@ def read(root: Path, split: None = None) -> list[Frame]:
 
 
 def read_matrices(path: Path) -> list[np.ndarray]:
-    """The matrices `world_mat_0`, `world_mat_1`, ... [4, 4] of a file.
-
-    Raises:
-        InputError: It is no such file, or it claims to hold more than it does.
-    """
+    """The matrices `world_mat_0`, `world_mat_1`, ... [4, 4] of a file. Raises InputError where it is no such file, or
+    it claims to hold more than it does."""
     try:
         with np.load(path, mmap_mode="r", allow_pickle=False) as archive:
             names = [name for name in archive.files if re.fullmatch(r"world_mat_\d{1,6}", name)]
@@ -86,11 +80,8 @@ def read_matrices(path: Path) -> list[np.ndarray]:
 
 
 def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """The pinhole of a projection: K [R | t] up to a factor.
-
-    Args:
-        matrix: [4, 4] or [3, 4], from the world to pixels whose first centre is (0, 0).
-        name: The name of the matrix for messages.
+    """The pinhole of a projection K [R | t], up to a factor, from the world to pixels whose first centre is (0, 0);
+    messages call the matrix [4, 4] or [3, 4] by its name.
 
     Returns:
         [4] (fx, fy, cx, cy) with pixel centres at +0.5, and [4, 4] camera-to-world, OpenGL axes.

@@ -31,9 +31,8 @@ from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 from splitnerf.files import is_file
-from splitnerf.notes import note_once
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
@@ -71,11 +70,8 @@ def splits(root: Path) -> list[str] | None:
 
 
 def read(root: Path, split: str | None) -> list[Frame]:
-    """The frames of a split, or all, in the order of the files.
-
-    Raises:
-        InputError: A file is missing or unusable, or a frame has no image, no usable pose or no lens.
-    """
+    """The frames of a split, or all, in the order of the files. Raises InputError where a file is missing or unusable,
+    or a frame has no image, no usable pose or no lens."""
     if split is None:
         own = [root / _own(name) for name in SPLITS if (root / _own(name)).is_file()]
         frames: dict[Path, Frame] = {}
@@ -90,18 +86,8 @@ def read(root: Path, split: str | None) -> list[Frame]:
 
 
 def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
-    """The cameras of a transforms file whose images need not exist, in its order.
-
-    Args:
-        path: JSON with `frames`, each with `transform_matrix`; `camera_angle_x` or `fl_x fl_y cx cy`, `w` and `h` in
-            each frame or for all.
-
-    Returns:
-        The pose [4, 4] float64 and the pinhole of each frame, as in `Frame`.
-
-    Raises:
-        InputError: The file has no frame, or one of them no usable pose or no lens.
-    """
+    """The cameras of a transforms file whose images need not exist, in its order: the pose [4, 4] float64 and the
+    pinhole, as in `Frame`. Raises InputError where the file has no frame, or one of them no usable pose or no lens."""
     meta, entries = read_entries(path)
     return [_read_camera(entry, meta, i, path, f"frame {i}")[:2] for i, entry in enumerate(entries)]
 

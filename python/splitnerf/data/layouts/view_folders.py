@@ -35,11 +35,8 @@ def splits(root: Path) -> list[str]:
 
 
 def read(root: Path, split: str | None) -> list[Frame]:
-    """The views of a split, or of both, by number.
-
-    Raises:
-        InputError: The split has no folder, or a folder lacks its photo or usable metadata.
-    """
+    """The views of a split, or of both, by number. Raises InputError where the split has no folder, or a folder lacks
+    its photo or usable metadata."""
     chosen = splits(root) if split is None else [split]
     folders = [folder for name in chosen for folder in _folders(root, name)]
     if not folders:

@@ -15,8 +15,8 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.errors import InputError
 from splitnerf.evaluate.lpips import Distance
-from splitnerf.evaluate.relight import FIRST_SEED
-from splitnerf.evaluate.similarity import image_scores
+from splitnerf.evaluate.protocol import image_scores
+from splitnerf.evaluate.scoring import FIRST_SEED
 from splitnerf.render.path_traced import MOST_SPP, MOST_VIEWS, AssetRenderer
 
 
@@ -49,13 +49,8 @@ class Options:
 
 @dataclass
 class Scores:
-    """The scores of a protocol.
-
-    Attributes:
-        images: The numbers of each image by key, with its name.
-        notes: Restrictions of the scores, for the reader.
-        means: Numbers of the table that are not the means over the images.
-    """
+    """The numbers of each image by key, with its name; restrictions, for the reader; and numbers of the table that are
+    not the means over the images."""
 
     images: list[dict]
     notes: list[str] = field(default_factory=list)
@@ -64,14 +59,8 @@ class Scores:
 
 @dataclass(frozen=True)
 class LitView:
-    """One photo in a known light.
-
-    Attributes:
-        frame: The photo.
-        light: The light's name.
-        radiance: Reads the light: [h, w, 3] linear radiance, equirectangular, in the data's world as
-            :func:`splitnerf.data.environment.read_environment` has it.
-    """
+    """A photo, its light's name, and what reads the light: [h, w, 3] linear radiance, equirectangular, in the data's
+    world as :func:`splitnerf.data.environment.read_environment` has it."""
 
     frame: Frame
     light: str
@@ -91,14 +80,8 @@ def light_of(path: Path, turn: np.ndarray | None = None) -> Callable[[], np.ndar
 
 
 class Delivered:
-    """An asset in the world of the data.
-
-    Args:
-        asset: The asset.
-        environment: [h, w, 3] the light of the photos as it was recovered, or None.
-        origin: [3] the point of the data's world that is the asset's origin.
-        spp: Paths a pixel.
-    """
+    """An asset in the world of the data, with the light [h, w, 3] of the photos as it was recovered (or None), the
+    point [3] of the data's world that is its origin, and paths a pixel."""
 
     def __init__(self, asset: Asset, environment: np.ndarray | None, origin: np.ndarray, spp: int):
         self.asset, self.environment, self.origin, self.spp = asset, environment, origin, spp
@@ -106,13 +89,8 @@ class Delivered:
         self._seed = FIRST_SEED
 
     def render(self, frame: Frame, light: np.ndarray | None, factor: int = 1) -> dict[str, np.ndarray]:
-        """The maps of `AssetRenderer.render` at a frame's camera.
-
-        Args:
-            frame: The frame; its photo's file has the size.
-            light: [h, w, 3]; None: any, for maps that do not depend on it.
-            factor: The integer by which the photo is larger.
-        """
+        """The maps of `AssetRenderer.render` at a frame's camera, smaller than its photo by an integer factor, under a
+        light [h, w, 3]; None: any, for maps that do not depend on it."""
         header, pose = read_header(frame.image_path), frame.pose.copy()
         height, width = header.height // factor, header.width // factor
         pose[:3, 3] -= self.origin
@@ -146,8 +124,3 @@ def _scaled(material: Material, scale: np.ndarray) -> Material:
 def compared(image: np.ndarray, truth: np.ndarray, options: Options, prefix: str = "") -> dict[str, float | None]:
     """PSNR, SSIM and LPIPS of sRGB images [H, W, 3] in [0, 1], by keys with a prefix."""
     return {f"{prefix}{key}": value for key, value in image_scores(image, truth, options.distance).items()}
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors [..., 3] of length 1; 0 stays 0."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-8)

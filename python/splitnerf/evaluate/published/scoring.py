@@ -19,11 +19,10 @@ from splitnerf.data.layouts import stanford_orb as orb_layout
 from splitnerf.data.layouts import transforms, view_folders
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
-from splitnerf.evaluate.asset import environment_beside
 from splitnerf.evaluate.lpips import find_distance
 from splitnerf.evaluate.published import stanford_orb, views
 from splitnerf.evaluate.published.common import Delivered, Options, Scores
-from splitnerf.evaluate.scoring import is_asset
+from splitnerf.evaluate.scoring import environment_beside, is_asset
 
 Column = tuple[str, str, str]  # key, title, format
 NUMBERS = Path(__file__).with_name("numbers.json")
@@ -68,18 +67,12 @@ PROTOCOLS = {
 
 
 def score_published(target: Path, data: Path, name: str, options: Options, env: Path | None = None) -> dict:
-    """Path-traces what a run delivers, its mesh.glb, or a GLB file, and scores it.
-
-    Args:
-        target: The run or the file, in the data's world frame.
-        data: The folder that was trained on.
-        name: One of :data:`PROTOCOLS`.
-        options: Paths a pixel, and the folders of lights and truth.
-        env: The light of the photos for novel views; None for the environment.exr or .hdr in its folder.
+    """Path-traces what a run delivers, its mesh.glb, or a GLB file, in the data's world frame, and scores it by one of
+    :data:`PROTOCOLS`. `env` is the light of the photos; None for the environment.exr or .hdr in the file's folder.
 
     Returns:
-        `protocol`, `scores` by key (None where the data hold no truth), `images` with those of each, `notes`, `published` and
-        `spp`.
+        `protocol`, `scores` by key (None where the data hold no truth), `images` with those of each, `notes`,
+        `published` and `spp`.
 
     Raises:
         InputError: A file cannot be used, or the data are not of the protocol's set.

@@ -14,6 +14,7 @@ import trimesh
 from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
+from splitnerf.data.asset import unit
 from splitnerf.data.images import (
     HDR_SUFFIXES,
     LDR_SUFFIXES,
@@ -30,7 +31,7 @@ from splitnerf.data.layouts.frame import Frame, folder_name
 from splitnerf.data.truth import read_mesh
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import lsq_scale, psnr
-from splitnerf.evaluate.published.common import Delivered, LitView, Options, Scores, light_of, unit
+from splitnerf.evaluate.published.common import Delivered, LitView, Options, Scores, light_of
 from splitnerf.files import is_file
 from splitnerf.progress import tracked
 
@@ -63,11 +64,8 @@ def score(delivered: Delivered, root: Path, options: Options) -> Scores:
 
 
 def relit(root: Path, truth: Path | None = None) -> list[LitView]:
-    """The photos of `transforms_novel.json` with their lights; `truth` is the folder `ground_truth` where it lies elsewhere.
-
-    Raises:
-        InputError: A file is missing or cannot be used.
-    """
+    """The photos of `transforms_novel.json` with their lights; `truth` is the folder `ground_truth` where it lies
+    elsewhere. Raises InputError where a file is missing or cannot be used."""
     path, views = root / layout.NOVEL, []
     meta, entries = transforms.read_entries(path)
     for i, entry in enumerate(entries):
@@ -80,19 +78,9 @@ def relit(root: Path, truth: Path | None = None) -> list[LitView]:
 
 
 def read_lit_photo(frame: Frame, factor: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Reads the photo of a pinhole at an exposure of 1.
-
-    Args:
-        frame: The frame.
-        factor: Linear values and masks are averaged down by this integer.
-
-    Returns:
-        [H, W, 3] float32 linear radiance as the file has it (not multiplied by coverage), and [H, W] float32 the mask in
-        [0, 1]: of the mask's file, else alpha, else 1.
-
-    Raises:
-        InputError: A file is missing or cannot be used.
-    """
+    """The photo of a pinhole at an exposure of 1, averaged down by a factor: [H, W, 3] float32 linear radiance as the
+    file has it (not multiplied by coverage), and [H, W] float32 the mask in [0, 1]: of the mask's file, else alpha,
+    else 1. Raises InputError where a file is missing or cannot be used."""
     path = frame.image_path
     if path.suffix.lower() not in LDR_SUFFIXES + HDR_SUFFIXES:
         raise InputError(f"{path}: must be PNG, JPEG, EXR or HDR; convert it")
@@ -126,18 +114,13 @@ def _is_hdr(frame: Frame) -> bool:
 def image_psnr(
     prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray, *, scaled: bool
 ) -> tuple[float, float] | tuple[None, None]:
-    """PSNR-H and PSNR-L in dB; None where nothing is inside of the eroded mask.
+    """PSNR-H and PSNR-L in dB of linear images [H, W, 3] with a mask [H, W]; None where nothing is inside of the eroded
+    mask.
 
     Both images are black outside of the mask, eroded by 5 x 5, and the error is the mean over the whole frame. With
     `scaled` each channel of the prediction has the factor that least squares give in linear light. PSNR-H: both images
     times mean(sRGB(y)) / mean(y) of the truth y clipped to 1, then clipped at 4, linear. PSNR-L: clipped at 1, in sRGB.
     Neither is less than that of an image that is 0.5 inside.
-
-    Args:
-        prediction: [H, W, 3] linear.
-        truth: [H, W, 3] linear.
-        mask: [H, W] in [0, 1].
-        scaled: Whether the prediction is known up to a factor per channel.
     """
     inside = eroded(mask)
     if not inside.any():

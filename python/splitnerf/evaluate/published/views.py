@@ -23,16 +23,16 @@ from types import ModuleType
 
 import numpy as np
 
-from splitnerf.data.frames import spread_views
-from splitnerf.data.images import over_background, read_image
+from splitnerf.data.asset import unit
+from splitnerf.data.dataset import spread
+from splitnerf.data.images import over_background, read_image, straight_srgb
 from splitnerf.data.layouts import transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.relit import map_files
+from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import angles_deg, lsq_scale, median_scale
-from splitnerf.evaluate.published.common import Delivered, LitView, Options, Scores, compared, light_of, unit
-from splitnerf.evaluate.relight import straight_srgb
-from splitnerf.evaluate.similarity import on_white
+from splitnerf.evaluate.protocol import on_white
+from splitnerf.evaluate.published.common import Delivered, LitView, Options, Scores, compared, light_of
 from splitnerf.files import is_file
 from splitnerf.progress import tracked
 
@@ -72,7 +72,7 @@ def nerfactor(delivered: Delivered, root: Path, options: Options) -> Scores:
     """NeRFactor's scores of views, albedo and normals, and of relit views where there are maps."""
     notes, frames = [], view_folders.read_others(root, "val")[: len(VALIDATION)]
     if not frames:
-        frames = spread_views(view_folders.read(root, "test"), len(VALIDATION))
+        frames = spread(view_folders.read(root, "test"), len(VALIDATION))
         notes.append(f"no folder val_000: {len(frames)} test views stand for the validation views")
     pairs = albedo_pairs(delivered, frames[:1])
     scale = opaque_scale(*pairs[0]) if pairs else np.ones(3)
@@ -105,7 +105,7 @@ def tensoir(delivered: Delivered, root: Path, options: Options) -> Scores:
     """TensoIR's scores of the test views, and of relit ones where there are maps."""
     notes: list[str] = []
     frames = test_views(view_folders, root, options, notes)
-    pairs = albedo_pairs(delivered, spread_views(frames, SCALE_VIEWS))
+    pairs = albedo_pairs(delivered, spread(frames, SCALE_VIEWS))
     scale, errors = median_ratio(pairs) if pairs else np.ones(3), []
 
     def compare(maps: dict, truth: FolderTruth) -> dict[str, float | None]:
@@ -125,11 +125,8 @@ def tensoir(delivered: Delivered, root: Path, options: Options) -> Scores:
 
 
 def shiny(delivered: Delivered, root: Path, options: Options) -> Scores:
-    """Shiny Blender's scores of the test views.
-
-    Raises:
-        InputError: The data list no test views, or are of another form than the set's.
-    """
+    """Shiny Blender's scores of the test views. Raises InputError where the data list no test views, or are of another
+    form than the set's."""
     if "test" not in (transforms.splits(root) or ()):
         raise InputError(f"{root}: lists no test views; give a folder with transforms_test.json")
     notes: list[str] = []
@@ -151,7 +148,7 @@ def test_views(layout: ModuleType, root: Path, options: Options, notes: list[str
     if options.views is None:
         return frames
     notes.append(f"{options.views} of {len(frames)} test views")
-    return spread_views(frames, options.views)
+    return spread(frames, options.views)
 
 
 def view_scores(
@@ -244,7 +241,7 @@ def relit_views(root: Path, maps: dict[str, Path]) -> list[LitView]:
 
 def _picture(maps: dict[str, np.ndarray]) -> np.ndarray:
     """[H, W, 3] the image of a rendering, clipped, in sRGB over white, composited as image viewers do."""
-    return over_background(straight_srgb(maps), maps["alpha"])
+    return over_background(straight_srgb(maps["radiance"], maps["alpha"]), maps["alpha"])
 
 
 def _read(path: Path) -> np.ndarray:

@@ -1,0 +1,154 @@
+"""Shared by the commands: exit codes, the format of their help, completion, options that read data, and printed scores."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from splitnerf.data.reading import Reading
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+SHELLS = ("bash", "zsh", "tcsh")
+TITLE = "examples:"
+
+
+def examples(*lines: str, after: str = "") -> str:
+    """The end of a command's help: command lines to copy, after a paragraph."""
+    return "\n".join(([after, ""] if after else []) + [TITLE, *(f"  {line}" for line in lines)])
+
+
+def examples_in(epilog: str | None) -> list[str]:
+    """The command lines in the end of a command's help."""
+    _, _, lines = (epilog or "").partition(TITLE)
+    return [line.strip() for line in lines.splitlines() if line.strip()]
+
+
+class Help(argparse.HelpFormatter):
+    """Wraps paragraphs, but leaves examples as they are."""
+
+    def __init__(self, prog: str):
+        super().__init__(prog, max_help_position=28)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        paragraph, title, lines = text.partition(TITLE)
+        filled = super()._fill_text(paragraph, width, indent) if paragraph.strip() else ""
+        return "\n\n".join(part for part in (filled, title + lines if title else "") if part)
+
+
+class ProgramHelp(Help):
+    """The help of the program: a title stands above each group of commands, `groups` names it by the group's first
+    command."""
+
+    def __init__(self, prog: str, groups: Mapping[str, str]):
+        super().__init__(prog)
+        self._groups = groups
+
+    def _format_action(self, action: argparse.Action) -> str:
+        text, title = super()._format_action(action), self._groups.get(action.dest)
+        return f"{'':{self._current_indent - 2}}{title}:\n{text}" if title else text
+
+
+class PrintCompletion(argparse.Action):
+    """Prints the script that completes a parser's commands in a shell, and ends the program."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: object, shell: str, option: str | None = None
+    ) -> None:
+        import shtab  # here: other commands need not load it
+
+        complete_files(parser, shtab.FILE)
+        print(shtab.complete(parser, shell))
+        parser.exit()
+
+
+def complete_files(parser: argparse.ArgumentParser, files: dict[str, str]) -> None:
+    """Marks all arguments of a parser and of its commands that are paths, so that names of files complete them."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                complete_files(command, files)
+        elif action.type is Path:
+            action.complete = files
+
+
+def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data state or suggest") -> None:
+    """Adds --eval-mode, --mask-kind and --max-memory; `default` is the help text of the first two's default."""
+    parser.add_argument(
+        "--eval-mode",
+        choices=["all", "fraction", "filename"],
+        help="what of the data is for testing: fraction, every 8th view; filename, the views with `test` or `eval` in "
+        f"their path, those with `train` train; all, no view is held out and all are evaluated (default: {default})",
+    )
+    parser.add_argument(
+        "--mask-kind",
+        choices=["object", "ignore"],
+        help="what mask files mean: object, white is the object; ignore, black is to be ignored and alpha is the "
+        f"object (default: {default})",
+    )
+    parser.add_argument(
+        "--max-memory",
+        type=float,
+        metavar="GB",
+        help="memory for photos; more are read from a file in TMPDIR (default: half of what is available)",
+    )
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, object]:
+    """The settings that the options give, by name."""
+    given = {"data.eval_mode": args.eval_mode, "data.mask_kind": args.mask_kind, "data.max_memory": args.max_memory}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def reading_of(args: argparse.Namespace, target: Path) -> Reading:
+    """How to read data: by the options, else as in the run that `target` is or belongs to, else by default."""
+    from splitnerf.config import Config
+    from splitnerf.data.reading import SEPARATED, is_separated
+
+    run = next((f for f in (target, *target.absolute().parents[:2]) if (f / "checkpoint.pt").is_file()), None)
+    config = Config() if run is None or not (run / "config.toml").is_file() else Config.read(run / "config.toml")
+    reading = config.replace(reading_options(args)).reading
+    return replace(reading, separated=run / SEPARATED) if run is not None and is_separated(run / SEPARATED) else reading
+
+
+def print_summary(
+    run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None, device: str = "cpu"
+) -> None:
+    """Prints the steps and the device, the errors against the truth in the data, and the path of the results."""
+    if step is not None and seconds is not None:
+        print(f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}")
+    print_refinement(evaluation.get("refinement"))
+    print_scores(evaluation)
+    print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
+
+
+def print_refinement(summary: dict | None) -> None:
+    """A line with the changes by the refinement, if there was one."""
+    if summary is None:
+        return
+    changes = ["colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"])]
+    if summary["outline_error"]:
+        changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
+    print(f"refinement, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
+
+
+def print_scores(evaluation: dict) -> None:
+    """A line for each score, after its free scale if it has one."""
+    for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):
+        scores = evaluation.get(key)
+        if scores:
+            lpips = "" if scores["lpips"] is None else f", LPIPS {scores['lpips']:.4f}"
+            print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}")
+    for name, key, unit in (
+        ("normals, mean angle", "normal_mae_deg", "degrees"),
+        ("roughness, mean error", "roughness_mae", ""),
+        ("metallic, bal. accuracy", "metallic_balanced_accuracy", ""),
+        ("light PSNR", "light_psnr", "dB"),
+        ("mesh chamfer", "chamfer", ""),
+        ("mesh F-score", "f_score", ""),
+    ):
+        if evaluation.get(key) is not None:
+            print(f"{name:22s} {evaluation[key]:.4g} {unit}".rstrip())
