@@ -11,7 +11,7 @@ from layout_scenes import CENTRE, COUNT, LENS, RADIUS, sphere_poses, write_trans
 from op_checks import generator
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.data.normalisation import MasksContradict, estimate_box, nearest_to_rays
+from splitnerf.data.normalisation import MasksContradict, estimate_box, nearest_to_rays, transform_points
 from splitnerf.data.reading import Reading
 from splitnerf.data.truth import ViewTruth
 from splitnerf.errors import InputError
@@ -306,7 +306,7 @@ def test_an_origin_far_away_is_brought_near(tmp_path):
     assert np.array_equal(far.origin, test.origin) and np.array_equal(far.origin, np.round(far.origin / 10) * 10)
     assert far.world_poses[:, :3, 3] + far.origin == pytest.approx(near.world_poses[:, :3, 3] + survey, abs=1e-4)
     assert np.abs(far.origin - survey).max() < 10 and np.abs(far.world_poses[:, :3, 3]).max() < 20
-    back = far.transform_to_world(np.zeros((1, 3)))[0] + far.origin
+    back = transform_points(far.world_from_box, np.zeros((1, 3)))[0] + far.origin
     assert np.linalg.norm(back - survey) < 0.5
     assert not near.origin.any()
 

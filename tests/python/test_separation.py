@@ -14,7 +14,7 @@ from blender_data import look_at
 from splitnerf.cli import main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_image, write_image
-from splitnerf.data.normalisation import box_of_views
+from splitnerf.data.normalisation import box_of_views, transform_points
 from splitnerf.data.photos import separated_mask
 from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
@@ -223,7 +223,7 @@ class TestReading:
             load_dataset(tmp_path, reading=Reading("all"))
         photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
         assert not photos.masked and (photos.images[..., 3] == 1).all()
-        np.testing.assert_allclose(photos.transform_to_world(np.zeros(3)), [0, 0, 0.35], atol=0.01)
+        np.testing.assert_allclose(transform_points(photos.world_from_box, np.zeros(3)), [0, 0, 0.35], atol=0.01)
 
     @pytest.mark.parametrize("alpha", [False, True])
     def test_found_masks_are_read(self, tmp_path, alpha):

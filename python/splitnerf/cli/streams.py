@@ -16,12 +16,8 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class Lasting:
-    """A text stream that drops what is written after its reader has ended.
-
-    Args:
-        stream: The stream.
-        results: Whether it carries results in place of messages: a full disk is then an error, and control characters
-            in names of files are shown and not obeyed by a terminal.
+    """A text stream that drops what is written after its reader has ended. Where it carries `results` in place of
+    messages, a full disk is an error, and control characters in names of files are shown and not obeyed by a terminal.
     """
 
     def __init__(self, stream: TextIO, *, results: bool):

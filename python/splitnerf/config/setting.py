@@ -66,12 +66,11 @@ def setting(
     multiple_of: int = 0,
     power_of_2: bool = False,
 ) -> Any:
-    """The field of a group of settings, with its description as metadata: ``meaning``, ``unit``, ``limits``.
+    """The field of a group of settings, with its description as metadata: ``meaning`` (a noun phrase), ``unit``,
+    ``limits``.
 
     Args:
         default: The value in the preset ``cpu``.
-        meaning: The meaning of the setting, a noun phrase.
-        unit: The unit of a number, or "".
         choices: The only allowed values; without them all values within the bounds are allowed.
         at_least, above: The lower bound of a number, with or without the bound itself (default: at least 0).
         at_most, below: The upper bound, with or without the bound itself (default: `LARGEST_INT`, `LARGEST_FLOAT`).

@@ -94,15 +94,8 @@ class Config:
         return UNLIMITED if self.refinement_minutes > 0 else self.refinement.sweeps
 
     def replace(self, settings: dict[str, object]) -> Config:
-        """A copy with some settings changed.
-
-        Args:
-            settings: Values by ``group.name`` or by a short name, see :data:`SHORT_NAMES`, or a table of values by
-                group.
-
-        Raises:
-            InputError: A name is unknown, or a value is not allowed.
-        """
+        """A copy with some settings changed: values by ``group.name`` or by a short name, see :data:`SHORT_NAMES`, or a
+        table of values by group. Raises InputError where a name is unknown, or a value is not allowed."""
         changes: dict[str, dict[str, object]] = {}
         for name, value in _flat(settings):
             group, _, key = name.partition(".")

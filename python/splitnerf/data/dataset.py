@@ -121,15 +121,11 @@ class Dataset:
         """[4, 4] float64, the inverse of `box_from_world`."""
         return np.linalg.inv(self.box_from_world)
 
-    def transform_to_world(self, points: np.ndarray) -> np.ndarray:
-        """Carries points [..., 3] from the internal frame to the data's world frame; directions need no change."""
-        return transform_points(self.world_from_box, points)
-
     @property
     def world_poses(self) -> np.ndarray:
         """[n, 4, 4] float64 camera-to-world, OpenGL axes, in the data's world frame."""
         poses = self.poses.astype(np.float64)
-        poses[:, :3, 3] = self.transform_to_world(poses[:, :3, 3])
+        poses[:, :3, 3] = transform_points(self.world_from_box, poses[:, :3, 3])
         return poses
 
     @property

@@ -299,25 +299,19 @@ def _palette_entries(path: Path) -> np.ndarray | None:
 
 
 class Loader:
-    """The photos of some frames.
-
-    All sizes are known, and all is estimated, before the first pixel is read.
+    """The photos of some frames. All sizes are known, and all is estimated, before the first pixel is read.
 
     Args:
-        root: The data's folder.
-        frames: The frames.
-        downscale: Integer factor of at least 1.
         reading: How the frames are read; its `max_memory` counts the photos that are in memory already.
         keep: Whether pixels are kept; else only what :meth:`load` returns.
 
     Attributes:
-        frames: The frames.
-        sizes: [n, 2] height and width of the photos as they are kept, in the upper left corner of an array for the tallest
-            and the widest.
+        sizes: [n, 2] height and width of the photos as they are kept, in the upper left corner of an array for the
+            tallest and the widest.
         exposures: [n] float64, the factors of the photos' linear values, as they are kept.
 
     Raises:
-        InputError: A file cannot be used, or neither memory nor disk have room for the photos.
+        InputError: A file cannot be used, or neither memory nor disk can hold the photos.
     """
 
     def __init__(self, root: Path, frames: Sequence[Frame], downscale: int, reading: Reading, keep: bool = True):
@@ -353,14 +347,8 @@ class Loader:
         self.exposures = np.array([frame.exposure for frame in frames])
 
     def load(self, mask_kind: str) -> list[Photo]:
-        """Reads the photos, whose pixels it keeps.
-
-        Args:
-            mask_kind: "object" or "ignore", see :func:`load_photo`.
-
-        Returns:
-            The photos without pixels.
-        """
+        """Reads the photos, whose pixels it keeps, and returns them without pixels; `mask_kind` as for
+        :func:`load_photo`."""
         with ThreadPoolExecutor(max_workers=self.threads) as pool:
             photos = list(pool.map(lambda i: self._load(i, mask_kind), range(len(self.frames))))
         self.exposures = np.array([frame.exposure * photo.scale for frame, photo in zip(self.frames, photos)])

@@ -44,7 +44,7 @@ def extract_mesh(
         RuntimeError: The field is not finite.
     """
     grid = _NodeGrid(sdf, box, resolution)
-    index = grid.all_blocks() if dense else grid.near_blocks()
+    index = np.zeros((grid.n_blocks,) * 3, np.int32) if dense else grid.near_blocks()
     active = np.flatnonzero(index.reshape(-1) == 0)
     values = grid.block_values(active)
     while True:
@@ -106,10 +106,6 @@ class _NodeGrid:
         inside = (distance < -reach) & whole
         signs[met] = np.where(distance > reach, _core.OUTSIDE_BLOCK, np.where(inside, _core.INSIDE_BLOCK, 0))
         return signs
-
-    def all_blocks(self) -> np.ndarray:
-        """The result of :meth:`near_blocks` if every block might contain surface."""
-        return np.zeros((self.n_blocks,) * 3, np.int32)
 
     def block_values(self, blocks: np.ndarray) -> np.ndarray:
         """[n, 4, 4, 4] float32 values of the nodes of blocks given by flat index."""
