@@ -53,29 +53,16 @@ def layer_outputs(
 
 
 def sdf_field(
-    positions,
-    table,
-    hidden,
-    hidden_length,
-    hidden_bias,
-    out,
-    out_length,
-    out_bias,
-    beta,
-    n_levels,
-    base,
-    growth,
-    log2_size,
-    n_active,
-    box,
+    positions, table, hidden, hidden_length, hidden_bias, out, out_length, out_bias, beta, *grid_and_box
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Outputs, features, and the gradient of the first output by differentiation, which is itself differentiated."""
+    *grid, box = grid_and_box
     hidden, out = (
         d * (length / d.norm(dim=1, keepdim=True)) for d, length in ((hidden, hidden_length), (out, out_length))
     )
     with torch.enable_grad():
         x = positions.detach().requires_grad_()
-        features = hash_encode(x / (2 * box) + 0.5, table, n_levels, base, growth, log2_size, n_active)
+        features = hash_encode(x / (2 * box) + 0.5, table, *grid)
         outputs = layer_outputs(x, features, hidden, hidden_bias, out, out_bias, beta)
         (gradient,) = torch.autograd.grad(outputs[:, 0].sum(), x, create_graph=True)
     return outputs, features, gradient
@@ -190,25 +177,12 @@ def gain(f0: Tensor | float, f1: Tensor, f2: Tensor, compensate: bool) -> Tensor
     return 1 + f0 * (1 / (f1 + f2) - 1) if compensate else 1.0
 
 
-def split_sum_shade(
-    normals,
-    view_dirs,
-    albedo,
-    roughness,
-    metallic,
-    specular,
-    diffuse,
-    occlusion_s,
-    occlusion_d,
-    lut,
-    mode,
-    compensate,
-    indirect_s=None,
-    indirect_d=None,
-) -> Tensor:
+def split_sum_shade(normals, view_dirs, albedo, roughness, metallic, specular, diffuse, *occlusion_and_rest) -> Tensor:
     """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and
     the dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and
     then L_d."""
+    occlusion_s, occlusion_d, lut, mode, compensate, *indirect = occlusion_and_rest
+    indirect_s, indirect_d = indirect or (None, None)
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     if mode:
@@ -409,25 +383,12 @@ def cached_visibility(
 
 
 def cached_occlusion(
-    positions,
-    normals,
-    lobe_dirs,
-    roughness,
-    vertices,
-    vertex_normals,
-    starts,
-    order,
-    radius,
-    bits,
-    hits,
-    radiance,
-    directions,
-    light,
+    positions, normals, lobe_dirs, roughness, *cache_and_light
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Shares of the light and means of the mesh's light, under the cosine and under the lobe, [n, 3] each."""
-    visible, sent = cached_visibility(
-        positions, normals, vertices, vertex_normals, starts, order, radius, bits, hits, radiance, directions
-    )
+    *cache, light = cache_and_light
+    visible, sent = cached_visibility(positions, normals, *cache)
+    directions = cache[-1]
     cosine = (normals @ directions.T).clamp(min=0)
     ggx_alpha = roughness.square().clamp(min=math.sqrt(2 / 3 / len(directions)))
     lobe = ggx_lobe(lobe_dirs @ directions.T, ggx_alpha.square()) * (cosine > 0)

@@ -98,17 +98,7 @@ def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[
 
 def shading_inputs(n: int) -> tuple[Tensor, ...]:
     normals, views = (F.normalize(torch.randn(n, 3), dim=1) for _ in range(2))
-    return (
-        normals,
-        views,
-        torch.rand(n, 3),
-        torch.rand(n, 1),
-        torch.rand(n, 1),
-        torch.rand(n, 3),
-        torch.rand(n, 3),
-        torch.rand(n, 3),
-        torch.rand(n, 3),
-    )
+    return normals, views, *(torch.rand(n, columns) for columns in (3, 1, 1, 3, 3, 3, 3))
 
 
 def checked(

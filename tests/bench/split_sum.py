@@ -1,13 +1,10 @@
-"""The errors of the split sum against the integral that it splits, and of its table against quadrature."""
+"""The errors of the split sum against the integral that it splits."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 import torch
 from scipy import ndimage
-from splitnerf import _core
 from splitnerf.ops import (
     QUERIES,
     LightSums,
@@ -17,8 +14,7 @@ from splitnerf.ops import (
     split_sum_shade,
     summed_light,
 )
-from splitnerf_tools.bench.charts import Chart, Point, Result
-from splitnerf_tools.bench.harness import rms
+from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.prefilter import Truth
 from splitnerf_tools.bench.subjects import MapLight, lights
 from stability.cases import drawn_directions
@@ -28,20 +24,12 @@ from torch.nn import functional as F
 ROUGHNESS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 COSINES = (0.1, 0.5, 0.9)  # n.v
 MATERIALS = {"metal": (1.0, 1.0), "dielectric": (0.0, 0.5)}  # metallic, albedo
-FINEST = 256  # quadrature points of a table's entry
-CHECKED = 41  # roughnesses and cosines at which tables are compared
 N_NORMALS = 64
 GROUPS = 4  # groups of samples of the truth
 LAMP_SHARE = 5e-4  # share of the texels, the brightest ones, that count as lamps
 PARTS = 4  # parts of a lamp's texel along its edge
-SOURCES = (
-    "cpp/*split_sum*",
-    "cpp/*brdf_lut*",
-    "cpp/*monte_carlo*",
-    "python/splitnerf/ops/shading.py",
-)
+SOURCES = ("cpp/*split_sum*", "cpp/*brdf_lut*", "cpp/*monte_carlo*", "python/splitnerf/ops/shading.py")
 NOISE = "noise"
-KARIS = "Karis 2014, fit"
 
 
 def run(quick: bool, rounds: int) -> Result:
@@ -78,14 +66,7 @@ def run(quick: bool, rounds: int) -> Result:
             + f"; noise of the truth at most {100 * worst[NOISE]:.1f} %"
         )
     tables.append(furnace())
-    charts = table_charts((8, 16, 32) if quick else (8, 16, 32, 64))
-    shipped = [next(p for p in chart.points if p.default) for chart in charts]
-    fit = next(p for p in charts[0].points if p.series == KARIS)
-    findings.append(
-        f"the table of {shipped[0].variant} over sqrt(n.v): RMS error {shipped[0].error:.1g} of F1 and F2, {shipped[1].error:.1g} "
-        f"of chi; Karis' fit, which was made for another shadowing term: {fit.error:.1g}"
-    )
-    return Result("split_sum", "The split sum: what it costs in error", SOURCES, findings, charts, tables)
+    return Result("split_sum", "The split sum: what it costs in error", SOURCES, findings, tables=tables)
 
 
 class SplitLight:
@@ -169,43 +150,3 @@ def furnace() -> tuple[str, list[str], list[list[str]]]:
         ]
         rows.append([f"{rho:g}", *(f"{v.mean().item():.3f}" for v in values)])
     return "Reflectance of a white metal, n.v = 1", ["roughness", "single scattering", "compensated"], rows
-
-
-def table_charts(sizes: tuple[int, ...]) -> list[Chart]:
-    """Charts of the errors of F1, F2 and chi against quadrature: tables by size and spacing, and an analytic fit."""
-    rho, cosine = np.linspace(0.02, 1, CHECKED), np.linspace(0.02, 1, CHECKED)
-    true = np.array([[_core.integrate_brdf(c, r, FINEST) for c in cosine] for r in rho])
-    spacings: dict[str, tuple[Callable, Callable]] = {
-        "table over sqrt(n.v)": (np.square, np.sqrt),
-        "table over n.v": (abs, abs),
-    }
-    found: list[list[Point]] = [[], []]
-    for series, (to_cosine, from_cosine) in spacings.items():
-        for size in sizes:
-            nodes = np.linspace(0, 1, size)
-            entries = [[_core.integrate_brdf(max(to_cosine(x), 1e-4), r, FINEST) for x in nodes] for r in nodes]
-            apart = bilinear(np.array(entries), rho, from_cosine(cosine)) - true
-            default = size == len(_core.brdf_lut()) and to_cosine is np.square
-            cost = 12 * size * size
-            for points, part in zip(found, (apart[..., :2], apart[..., 2])):
-                points.append(Point(series, f"{size} x {size}", cost, rms(part), cost, cost, default))
-    fit = karis_fit(rho[:, None], cosine[None, :])
-    found[0].append(Point(KARIS, "8 numbers", 32, rms(fit - true[..., :2]), 32, 32))
-    names = ("F1 and F2 against quadrature", "chi against quadrature")
-    return [Chart(name, "bytes held", "RMS error", points) for name, points in zip(names, found)]
-
-
-def bilinear(table: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """[len(rows), len(columns), C] of a [n, n, C] table whose nodes are spread over [0, 1]."""
-    y, x = (t * (len(table) - 1) for t in (rows, columns))
-    y0, x0 = (np.minimum(t.astype(int), len(table) - 2) for t in (y, x))
-    fy, fx = (y - y0)[:, None, None], (x - x0)[None, :, None]
-    upper, lower = (table[y0 + k][:, x0] * (1 - fx) + table[y0 + k][:, x0 + 1] * fx for k in (0, 1))
-    return upper * (1 - fy) + lower * fy
-
-
-def karis_fit(roughness: np.ndarray, n_dot_v: np.ndarray) -> np.ndarray:
-    """[..., 2] F1 and F2 by the approximation of Karis 2014, "Physically Based Shading on Mobile"."""
-    r = [a * roughness + b for a, b in ((-1, 1), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))]
-    edge = np.minimum(r[0] * r[0], np.exp2(-9.28 * n_dot_v)) * r[0] + r[1]
-    return np.stack([-1.04 * edge + r[2], 1.04 * edge + r[3]], -1)

@@ -11,7 +11,6 @@ reader sees them.
 
 from __future__ import annotations
 
-import abc
 import contextlib
 import gc
 import io
@@ -23,6 +22,7 @@ import tempfile
 import types
 import zipfile
 import zlib
+from functools import partial
 from pathlib import Path
 
 import atheris
@@ -42,7 +42,7 @@ from splitnerf.render.model import SceneModel
 from splitnerf.training.checkpoint import load_checkpoint, restore_model, restore_optimiser, save_checkpoint
 from splitnerf.training.schedule import make_optimiser
 
-DEFAULTS = {"-rss_limit_mb": "3000", "-timeout": "20", "-max_len": "65536"}
+DEFAULTS = ["-rss_limit_mb=3000", "-timeout=20", "-max_len=65536"]  # the last of two values counts
 INSTRUMENTED = ("splitnerf", "zipfile", "pickletools", "torch._weights_only_unpickler")
 SIZE = 16
 RAW, MENDED = b"\0", b"\1"  # first byte of an input for the readers whose files hold sums
@@ -72,19 +72,11 @@ def write_scene(folder: Path) -> dict:
     return {"camera_angle_x": 0.7, "frames": frames}
 
 
-class Reader(abc.ABC):
-    """What a reader is fed: `corpus` are its seeds, `read` takes one input that lies in `self.folder`."""
+class Reader:
+    """What a reader is fed: `corpus()` gives its seeds, `read(data)` takes one input that lies in `self.folder`."""
 
     def __init__(self, folder: Path):
         self.folder = folder
-
-    @abc.abstractmethod
-    def corpus(self) -> list[bytes]:
-        """Small valid files."""
-
-    @abc.abstractmethod
-    def read(self, data: bytes) -> None:
-        """Reads one input."""
 
     def file(self, name: str, data: bytes) -> Path:
         path = self.folder / name
@@ -162,52 +154,36 @@ class NeusReader(Reader):
 class ImageReader(Reader):
     """A file by itself; as bare pixels and, where it may be one, as an environment map."""
 
-    suffix = ""
+    def __init__(self, folder: Path, suffix: str):
+        super().__init__(folder)
+        self.suffix = suffix
 
     def corpus(self) -> list[bytes]:
-        seeds = []
-        coloured = disc(8)[..., :3] if self.suffix == ".hdr" else disc(8)
-        for pixels in (coloured, disc(4)[:2, ..., :3]):
-            write_image(self.folder / f"seed{self.suffix}", pixels)
-            seeds.append((self.folder / f"seed{self.suffix}").read_bytes())
-        return seeds
+        seeds, path = [], self.folder / f"seed{self.suffix}"
+        for pixels in (disc(8)[..., :3] if self.suffix == ".hdr" else disc(8), disc(4)[:2, ..., :3]):
+            write_image(path, pixels)
+            seeds.append(path.read_bytes())
+        return [kind + seed for seed in seeds for kind in (RAW, MENDED)] if self.suffix == ".png" else seeds
 
     def read(self, data: bytes) -> None:
+        if self.suffix == ".png":
+            data = mended(data[1:]) if data[:1] == MENDED else data[1:]
         path = self.file(f"image{self.suffix}", data)
-        with contextlib.suppress(InputError):
-            read_environment(path)
-        with contextlib.suppress(InputError):
-            read_radiance(path)
+        for read in (read_environment, read_radiance):
+            with contextlib.suppress(InputError):
+                read(path)
         read_image(path)
 
 
-class ExrReader(ImageReader):
-    suffix = ".exr"
-
-
-class HdrReader(ImageReader):
-    suffix = ".hdr"
-
-
-class PngReader(ImageReader):
-    suffix = ".png"
-
-    def corpus(self) -> list[bytes]:
-        return [kind + seed for seed in super().corpus() for kind in (RAW, MENDED)]
-
-    def read(self, data: bytes) -> None:
-        super().read(self.mended(data[1:]) if data[:1] == MENDED else data[1:])
-
-    @staticmethod
-    def mended(data: bytes) -> bytes:
-        """With the sums that its chunks should have."""
-        out, at = bytearray(data[:8]), 8
-        while at + 12 <= len(data):
-            length = min(struct.unpack_from(">I", data, at)[0], len(data) - at - 12)
-            body = data[at + 4 : at + 8 + length]
-            out += struct.pack(">I", length) + body + struct.pack(">I", zlib.crc32(body))
-            at += 12 + length
-        return bytes(out)
+def mended(data: bytes) -> bytes:
+    """A PNG with the sums that its chunks should have."""
+    out, at = bytearray(data[:8]), 8
+    while at + 12 <= len(data):
+        length = min(struct.unpack_from(">I", data, at)[0], len(data) - at - 12)
+        body = data[at + 4 : at + 8 + length]
+        out += struct.pack(">I", length) + body + struct.pack(">I", zlib.crc32(body))
+        at += 12 + length
+    return bytes(out)
 
 
 class GlbReader(Reader):
@@ -306,9 +282,7 @@ READERS = {
     "json": JsonReader,
     "colmap": ColmapReader,
     "neus": NeusReader,
-    "png": PngReader,
-    "exr": ExrReader,
-    "hdr": HdrReader,
+    **{name: partial(ImageReader, suffix=f".{name}") for name in ("png", "exr", "hdr")},
     "glb": GlbReader,
     "checkpoint": CheckpointReader,
 }
@@ -320,11 +294,7 @@ def main() -> None:
     name, options = sys.argv[1], sys.argv[2:]
     corpus = Path("build/fuzz") / name
     corpus.mkdir(parents=True, exist_ok=True)
-    options += [
-        f"{key}={value}" for key, value in DEFAULTS.items() if not any(o.startswith(key + "=") for o in options)
-    ]
-    if not any(option.startswith("-artifact_prefix=") for option in options):
-        options.append(f"-artifact_prefix=build/fuzz/{name}-")
+    options = [*DEFAULTS, f"-artifact_prefix=build/fuzz/{name}-", *options]
     with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as unread:
         reader = READERS[name](Path(folder))
         for i, seed in enumerate(reader.corpus()):
@@ -338,12 +308,9 @@ def main() -> None:
                     assert len(str(error).splitlines()) == 1, error
 
         instrument()
-        atheris.Setup([sys.argv[0], *options, *([] if _has_inputs(options) else [str(corpus)])], feed)
+        given = any(not option.startswith("-") for option in options)
+        atheris.Setup([sys.argv[0], *options, *([] if given else [str(corpus)])], feed)
         atheris.Fuzz()
-
-
-def _has_inputs(options: list[str]) -> bool:
-    return any(not option.startswith("-") for option in options)
 
 
 if __name__ == "__main__":

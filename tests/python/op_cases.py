@@ -153,24 +153,10 @@ def sampling_settings(**changes) -> dict:
 
 
 def sample_rays_inputs(dtype=torch.float64) -> tuple:
-    n = bumpy_field().to(dtype).network()
-    o, d, jitter = field_rays(12, dtype)
-    return (
-        o,
-        d,
-        jitter,
-        full_cells(),
-        *n._replace(n_active=2).arguments(),
-        STEP,
-        64,
-        60.0,
-        1.0,
-        0.01,
-        1e-3,
-        0.1,
-        1.25,
-        0,
-    )
+    network = bumpy_field().to(dtype).network()._replace(n_active=2)
+    s, anneal, min_weight, min_transmittance, reach, lipschitz = 60.0, 1.0, 0.01, 1e-3, 0.1, 1.25
+    rules = STEP, 64, s, anneal, min_weight, min_transmittance, reach, lipschitz, 0
+    return *field_rays(12, dtype), full_cells(), *network.arguments(), *rules
 
 
 def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
@@ -181,20 +167,10 @@ def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
         return torch.randn(*shape, generator=g, dtype=torch.float64).to(dtype)
 
     beta_scale = 0.02  # around the bend of softplus_100
-    levels = SDF_SPEC.arguments(2)
-    return (
-        0.7 * randn(n, 3),
-        randn(SDF_SPEC.n_entries, 2),
-        randn(10, 9),
-        beta_scale * (2 + randn(10, 1)),
-        beta_scale * randn(10),
-        randn(4, 10),
-        2 + randn(4, 1),
-        randn(4),
-        100.0,
-        *levels,
-        BOX,
-    )
+    positions, table = 0.7 * randn(n, 3), randn(SDF_SPEC.n_entries, 2)
+    hidden = randn(10, 9), beta_scale * (2 + randn(10, 1)), beta_scale * randn(10)
+    out = randn(4, 10), 2 + randn(4, 1), randn(4)
+    return positions, table, *hidden, *out, 100.0, *SDF_SPEC.arguments(2), BOX
 
 
 # ---- cached visibility ----
@@ -210,22 +186,8 @@ def cached_occlusion_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
     roughness = torch.rand(9, 1, generator=generator(2))[:n].to(dtype)
     radiance = torch.rand(len(cache.vertices) if with_hits else 0, 3, generator=generator(3)).to(dtype)
     light = torch.rand(64, 3, generator=generator(4)).to(dtype)
-    return (
-        x,
-        normals,
-        lobes,
-        roughness,
-        cache.vertices.to(dtype),
-        cache.normals.to(dtype),
-        cache.starts,
-        cache.order,
-        cache.radius,
-        cache.bits,
-        cache.hits,
-        radiance,
-        cache.directions.to(dtype),
-        light,
-    )
+    grids = cache.vertices.to(dtype), cache.normals.to(dtype), cache.starts, cache.order, cache.radius
+    return x, normals, lobes, roughness, *grids, cache.bits, cache.hits, radiance, cache.directions.to(dtype), light
 
 
 def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
@@ -250,16 +212,8 @@ def traced_points(n: int = 9) -> tuple:
 
 
 def occlusion_inputs() -> tuple:
-    return (
-        floor_under_a_ball().handle,
-        *traced_points(),
-        *(rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3))),
-        16,
-        16,
-        OFFSET,
-        False,
-        3,
-    )
+    roughness, sky = (rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3)))
+    return floor_under_a_ball().handle, *traced_points(), roughness, sky, 16, 16, OFFSET, False, 3
 
 
 def incoming_inputs() -> tuple:
@@ -267,12 +221,8 @@ def incoming_inputs() -> tuple:
     (points, normals, views), n = traced_points(), len(trimesh.creation.icosphere(1).vertices) + 36
     materials = (rand(9, k, seed=k, dtype=torch.float32) for k in (3, 1, 1))
     maps = (rand(4, 4, k, seed=k, dtype=torch.float32) for k in (3, 2, 3))
-    surface = (
-        torch.tensor([0.0, 0, 1]).repeat(n, 1),
-        torch.tensor([1.0, 0, 0, 1]).repeat(n, 1),
-        rand(n, 2, dtype=torch.float32),
-    )
-    sky = rand(8, 16, 3, dtype=torch.float32)
+    up, along = torch.tensor([0.0, 0, 1]).repeat(n, 1), torch.tensor([1.0, 0, 0, 1]).repeat(n, 1)
+    surface, sky = (up, along, rand(n, 2, dtype=torch.float32)), rand(8, 16, 3, dtype=torch.float32)
     return floor_under_a_ball().handle, points, normals, normals, views, *materials, *surface, *maps, sky, 4, 2, 0.0, 3
 
 
@@ -300,12 +250,8 @@ def sparse_inputs(dtype) -> tuple:
 def interpolation(dtype) -> tuple:
     first = torch.tensor([0, 0, 1, 2, 2, 4])
     share = torch.rand(6, generator=generator(), dtype=torch.float64).to(dtype)
-    return (
-        torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype),
-        first,
-        first.clamp(max=3) + 1,
-        share,
-    )
+    values = torch.randn(5, 4, generator=generator(1), dtype=torch.float64).to(dtype)
+    return values, first, first.clamp(max=3) + 1, share
 
 
 def interpolation_backward(dtype) -> tuple:

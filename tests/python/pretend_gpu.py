@@ -21,26 +21,12 @@ from torch.utils._pytree import tree_iter, tree_map
 GPU = torch.device("cuda", 0)
 CPU = torch.device("cpu")
 ON_CPU_BY_CONTRACT = {"splitnerf.light_lookup": (4, 5), "splitnerf::light_lookup": (4, 5)}  # resolutions and nodes
-WAITS = {
-    "item",
-    "tolist",
-    "nonzero",
-    "argwhere",
-    "unique",
-    "unique_consecutive",
-    "masked_select",
-    "bincount",
-    "repeat_interleave",
-    "equal",
-    "allclose",
-    "is_nonzero",
-    "__bool__",
-    "__int__",
-    "__float__",
-    "__index__",
-    "__contains__",
-    "cpu",
-}
+WAITS = set(
+    (
+        "item tolist nonzero argwhere unique unique_consecutive masked_select bincount repeat_interleave "
+        "equal allclose is_nonzero __bool__ __int__ __float__ __index__ __contains__ cpu"
+    ).split()
+)
 FROM_LISTS = {"tensor", "as_tensor", "new_tensor"}
 ACROSS = {"_has_compatible_shallow_copy_type", "__set__", "copy_"}  # one tensor takes the place of another
 

@@ -18,16 +18,7 @@ from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
 
-REFUSED = (
-    "_local_scalar_dense",
-    "lift_fresh",
-    "_to_copy",
-    "nonzero",
-    "masked_select",
-    "_unique2",
-    "march_rays",
-    "sample_rays",
-)
+REFUSED = "_local_scalar_dense lift_fresh _to_copy nonzero masked_select _unique2 march_rays sample_rays".split()
 
 
 def tensors(value: object) -> list[Tensor]:

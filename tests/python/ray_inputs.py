@@ -18,9 +18,8 @@ def composite_inputs(device, dtype) -> tuple:
 def march_inputs(device, dtype, n: int = 40) -> tuple:
     """Arguments of ``march_rays``: cameras inside and outside the box, some rays parallel to an axis."""
     draw = generator(3)
-    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64)) * (
-        1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64)
-    )
+    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64))
+    origins *= 1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64)
     directions = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64) * 0.4 - origins)
     directions[::8] = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
     jitter = torch.rand(n, generator=draw, dtype=torch.float64)
@@ -32,10 +31,8 @@ def march_inputs(device, dtype, n: int = 40) -> tuple:
 def draw_inputs(dtype, n: int = 300) -> tuple:
     """Arguments of ``draw_rays``: a third of the rays near the runs of two of three photos of 8 x 11 pixels."""
     last, shift = torch.tensor([4, 5, 40]), torch.tensor([10, 30, 200])
-    none, matrices = (
-        torch.empty(0, dtype=torch.int64),
-        torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64),
-    )
+    matrices = torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64)
+    none = torch.empty(0, dtype=torch.int64)
     cameras = matrices.to(dtype), torch.arange(9.0, dtype=dtype).view(3, 3)
     return rand(n, dtype=dtype), n // 3, last, shift, 40, none, none, 3 * 8 * 11, *cameras, 8, 11
 
@@ -44,10 +41,8 @@ def read_inputs(dtype, n: int = 300) -> tuple:
     """Arguments of ``read_pixels``: three photos of 40 pixels as words, and two runs of pixels at edges."""
     draw = generator(8)
     codes = torch.randint(-(2**15), 2**15, (120, 4), generator=draw).to(torch.int16)
-    index, behind = (
-        torch.randint(120, (n,), generator=draw),
-        torch.randint(256, (46, 3), generator=draw).to(torch.uint8),
-    )
+    index = torch.randint(120, (n,), generator=draw)
+    behind = torch.randint(256, (46, 3), generator=draw).to(torch.uint8)
     edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54]), behind
     return codes, index, index // 40, rand(3, 3, seed=9, dtype=dtype), rand(n, 3, seed=10, dtype=dtype), *edges
 

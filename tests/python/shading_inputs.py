@@ -40,22 +40,8 @@ def split_sum_inputs(device, dtype, mode: int = 0, compensate: bool = False, cha
     draw = generator(3)
     rest = [torch.rand(n, k, generator=draw, dtype=torch.float64) for k in (3, 1, 3, 3, channels, channels)]
     albedo, metallic, specular, diffuse, occlusion_s, occlusion_d = (x.to(device, dtype) for x in rest)
-    return (
-        normals,
-        views,
-        albedo,
-        roughness,
-        metallic,
-        3 * specular,
-        2 * diffuse,
-        occlusion_s,
-        occlusion_d,
-        lut,
-        mode,
-        compensate,
-        None,
-        None,
-    )
+    points = normals, views, albedo, roughness, metallic
+    return *points, 3 * specular, 2 * diffuse, occlusion_s, occlusion_d, lut, mode, compensate, None, None
 
 
 def indirect_inputs(dtype, mode: int = 0, channels: int = 3, n: int = 300, stacked: bool = False) -> tuple:

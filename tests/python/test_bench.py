@@ -178,15 +178,6 @@ def test_without_a_name_all_are_measured(monkeypatch):
 
 
 class TestSplitSum:
-    def test_finer_tables_are_better_and_the_fit_is_rough(self):
-        chart, chi = split_sum.table_charts((8, 32))
-        errors = {(p.series, p.variant): p.error for p in chart.points}
-        fine, coarse = errors["table over sqrt(n.v)", "32 x 32"], errors["table over sqrt(n.v)", "8 x 8"]
-        assert fine < coarse < errors["Karis 2014, fit", "8 numbers"] < 0.2
-        assert [p.variant for p in chart.points if p.default] == ["32 x 32"]
-        errors = {(p.series, p.variant): p.error for p in chi.points}
-        assert errors["table over sqrt(n.v)", "32 x 32"] < errors["table over sqrt(n.v)", "8 x 8"] < 0.1
-
     def test_constant_light_splits_without_error(self):
         """All lobes see the same light: what is left is the noise of the sums and the table."""
         torch.manual_seed(0)

@@ -123,17 +123,7 @@ def test_all_is_well_here(capsys):
     assert main(["doctor"]) == DONE
     said = capsys.readouterr().out
     assert f"{len(self_test.answers())} operators, all as they should be" in said
-    for name in (
-        "splitnerf",
-        "Python",
-        "torch",
-        "kernels",
-        "CUDA",
-        "ray tracing",
-        "texture coordinates",
-        "memory",
-        "disk",
-    ):
+    for name in "splitnerf, Python, torch, kernels, CUDA, ray tracing, texture coordinates, memory, disk".split(", "):
         assert f"\n{name} " in f"\n{said}"
     lines = [line for line in said.splitlines() if "->" not in line]
     assert all(line[23] == " " and line[24] != " " for line in lines)  # values stand below each other

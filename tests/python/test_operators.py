@@ -107,6 +107,12 @@ def short_gradients(dtype: torch.dtype) -> tuple:
     return gradients * torch.logspace(-3.3, -0.3, 40).to(dtype)[torch.arange(40) * 7 % 40][:, None], *rest
 
 
+def annealed(anneal: float, dtype: torch.dtype) -> tuple:
+    """Of rays that end at a transmittance of 0.3."""
+    *samples, _, _, n = CASES["surface_weights"](dtype)
+    return *samples, torch.tensor(anneal, dtype=dtype), 0.3, n
+
+
 # Other settings of the same operators: what the first case of each does not reach.
 OTHERS = [
     *(
@@ -116,18 +122,7 @@ OTHERS = [
     ),
     ("light_queries", lambda t: query_inputs("cpu", t, False, 300)),
     ("shade_sums", lambda t: mixed_sums_inputs(300, t, compensate=False)),
-    *(
-        (
-            "surface_weights",
-            lambda t, anneal=anneal: (
-                *CASES["surface_weights"](t)[:6],
-                torch.tensor(anneal, dtype=t),
-                0.3,
-                CASES["surface_weights"](t)[8],
-            ),
-        )
-        for anneal in (0.0, 1.0)
-    ),
+    *(("surface_weights", lambda t, anneal=anneal: annealed(anneal, t)) for anneal in (0.0, 1.0)),
     ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
     ("light_lookup", deep_light),
     ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
@@ -330,26 +325,12 @@ assert x.grad is not None
 
 # Operators whose results at a point depend on nothing else of the call.
 BY_POINT = (
-    "hash_encode",
-    "sdf_field",
-    "sdf_values",
-    "split_sum_shade",
-    "prefilter_light",
-    "sample_ggx_lobe",
-    "light_lookup",
-    "monte_carlo_light",
-    "summed_light",
-    "shade_sums",
-    "linear_to_srgb",
-    "srgb_to_linear",
-    "read_pixels",
-    "cached_occlusion",
-    "cached_visibility",
-    "occlusion_factors",
-    "incoming_light",
-    "visibility_bits",
-)
+    "hash_encode sdf_field sdf_values split_sum_shade prefilter_light sample_ggx_lobe light_lookup "
+    "monte_carlo_light summed_light shade_sums linear_to_srgb srgb_to_linear read_pixels cached_occlusion "
+    "cached_visibility occlusion_factors incoming_light visibility_bits"
+).split()
 NONE_3, NONE, LONG = torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, dtype=torch.int64)
+NO_SAMPLE, HALF_AND_NONE = torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0])
 CELLS = torch.ones(4, 4, 4, dtype=torch.uint8)
 # The others without a point, or without a sample on two rays.
 EMPTY = {
@@ -361,14 +342,14 @@ EMPTY = {
         NONE,
         NONE_3,
         torch.eye(3)[:2],
-        torch.tensor(9.0),
-        torch.zeros(3, dtype=torch.int64),
-        *torch.tensor([0.1, 1.0]),
+        *torch.tensor([9.0]),
+        NO_SAMPLE,
+        *HALF_AND_NONE,
         0.0,
         -1,
     ),
-    "composite": lambda t: (NONE, NONE_3, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 0.1),
-    "spread_samples": lambda t: (NONE, NONE, torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0]), 1.0, 2),
+    "composite": lambda t: (NONE, NONE_3, NO_SAMPLE, HALF_AND_NONE, 0.1),
+    "spread_samples": lambda t: (NONE, NONE, NO_SAMPLE, HALF_AND_NONE, 1.0, 2),
     "interpolate": lambda t: (torch.ones(2, 3), LONG, LONG, NONE),
     "pixel_losses": lambda t: (NONE_3, NONE, torch.zeros(0, 4), NONE_3, None, None, True),
     "gradient_losses": lambda t: (NONE_3, NONE, LONG),

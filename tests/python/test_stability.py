@@ -90,7 +90,7 @@ def planted(error, bound: float = 1e-6, **changes) -> Entry:
         return {"y": x * x * (1 + error(x)) if x.dtype == torch.float32 else x * x}
 
     draw = lambda source, n: {"x": source.uniform(n, 1, low=0.5, high=2)}  # noqa: E731
-    options = {"draw": draw, "call": call, "smooth": ("x",), "gradient_bound": bound} | changes
+    options = {"draw": draw, "call": call, "smooth": ("x",), "gradient_bound": bound, "conditioned": False} | changes
     return Entry("planted", bound=bound, reason="x^2", **options)
 
 
@@ -154,9 +154,9 @@ def test_the_condition_forgives_cancellation_but_no_other_error():
 
         return call
 
-    entry = Entry("difference", draw=draw, call=difference(6e-8), bound=1e-6, reason="", conditioned=True)
+    entry = Entry("difference", draw=draw, call=difference(6e-8), bound=1e-6, reason="")
     assert search.run(entry, 500).holds and search.run(entry, 500).plain_forward > 1e-5
-    broken = Entry("difference", draw=draw, call=difference(1e-4), bound=1e-6, reason="", conditioned=True)
+    broken = Entry("difference", draw=draw, call=difference(1e-4), bound=1e-6, reason="")
     assert not search.run(broken, 500).holds
 
 

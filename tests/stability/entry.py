@@ -63,7 +63,7 @@ class Entry:
     shared: Rows = field(default_factory=dict)
     floor: float = 1e-35
     gradient_floor: float = 1e-35
-    conditioned: bool = False
+    conditioned: bool = True
     vectors: tuple[str, ...] = ()
     repair: Callable[[Rows], Rows] = unchanged
     exact: Callable[[dict[str, np.ndarray], Rows], dict[str, list]] | None = None

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import torch
 from splitnerf import ops
+from splitnerf.ops.light import SH_COEFFICIENTS
 from torch import Tensor
 
 from stability import exact_light
@@ -69,7 +70,7 @@ def pyramid() -> Rows:
     levels = draw.uniform(sum(r * r for r in RESOLUTIONS), 3)
     levels[5] = 1e6
     levels[300:310] = 0
-    sh = 0.1 * draw.normal(ops.light_pyramid.SH_COEFFICIENTS, 3)
+    sh = 0.1 * draw.normal(SH_COEFFICIENTS, 3)
     sh[0] = torch.tensor([4.0, 0.5, 1e-3])
     return {"levels": levels.float(), "sh": sh.float(), "zonal": ops.zonal_factors(NODES[-1], ZONAL_ROWS)}
 
@@ -105,7 +106,6 @@ ENTRIES = (
         smooth_shared=("light",),
         shared=lamps(),
         repair=repaired,
-        conditioned=True,
         bound=4e-6,
         gradient_bound=1e-5,
         floor=1e-22,
@@ -121,7 +121,6 @@ ENTRIES = (
         smooth_shared=("light",),
         shared=bright(1e30),
         repair=repaired,
-        conditioned=True,
         bound=4e-6,
         gradient_bound=1e-5,
         reason="as above; a constant light stays itself",
@@ -137,7 +136,6 @@ ENTRIES = (
         shared=pyramid(),
         repair=repaired_lookup,
         vectors=("directions",),
-        conditioned=True,
         bound=4e-6,
         gradient_bound=2e-5,
         floor=1e-6,
@@ -151,7 +149,6 @@ ENTRIES = (
         "sparse_product",
         call=products,
         smooth=("values",),
-        conditioned=True,
         bound=2e-6,
         gradient_bound=2e-6,
         size=64,

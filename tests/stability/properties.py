@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 import torch
+import trimesh
 from splitnerf import ops
 from torch import Tensor
 
@@ -19,21 +20,8 @@ from stability.cases import Draw, unit
 from stability.entry import Rows
 
 HALF = 0.75  # half the edge of the cube that is traced
-CORNERS = ((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))
-FACES = (
-    (0, 2, 1),
-    (0, 3, 2),
-    (4, 5, 6),
-    (4, 6, 7),
-    (0, 1, 5),
-    (0, 5, 4),
-    (2, 3, 7),
-    (2, 7, 6),
-    (0, 4, 7),
-    (0, 7, 3),
-    (1, 2, 6),
-    (1, 6, 5),
-)
+CUBE = trimesh.creation.box((2 * HALF,) * 3)
+CORNERS = torch.from_numpy(np.sign(CUBE.vertices)).float()
 
 
 @dataclass(frozen=True)
@@ -56,7 +44,7 @@ class Property:
 
 @lru_cache(maxsize=1)
 def cube() -> ops.MeshScene:
-    return ops.MeshScene(np.array(CORNERS, dtype=np.float32) * HALF, np.array(FACES, dtype=np.int32))
+    return ops.MeshScene(CUBE.vertices, CUBE.faces)
 
 
 def on_cube(draw: Draw, n: int) -> tuple[Tensor, Tensor]:
@@ -101,14 +89,14 @@ def open_outside(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 def chequered() -> ops.TexturedSurface:
     """The cube, its normals those of its corners, with textures of extremes."""
     n, black_and_white = len(CORNERS), (torch.arange(16).reshape(4, 4) * 5 % 3 % 2).float()
-    normals = unit(torch.tensor(CORNERS, dtype=torch.float64)).float()
+    normals = unit(CORNERS.double()).float()
     side = unit(torch.linalg.cross(normals, torch.tensor([0.0, 0.0, 1.0]).expand(n, 3)))
     tilts = torch.stack([2 * black_and_white - 1, 1 - 2 * black_and_white.T, 0 * black_and_white], -1)
     return ops.TexturedSurface(
         cube(),
         normals,
         torch.cat([side, torch.ones(n, 1)], 1),
-        torch.tensor(CORNERS)[:, :2] * 0.7,
+        CORNERS[:, :2] * 0.7,
         black_and_white[..., None].expand(4, 4, 3),
         torch.stack([black_and_white.T, black_and_white], -1),
         tilts,
@@ -182,7 +170,7 @@ def all_blocked(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 
 @lru_cache(maxsize=1)
 def cache() -> ops.VisibilityCache:
-    vertices = torch.tensor(CORNERS) * HALF
+    vertices = HALF * CORNERS
     directions = ops.fibonacci_directions(64, torch.Generator().manual_seed(0))
     return ops.VisibilityCache.trace(
         cube(), vertices, unit(vertices.double()).float(), 24 * HALF**2, directions, with_hits=True

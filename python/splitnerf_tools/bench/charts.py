@@ -116,34 +116,13 @@ def write_csv(path: Path, facts: dict[str, str], rows: Iterable[Sequence[object]
 
 
 def csv_rows(charts: Sequence[Chart]) -> Iterator[list[object]]:
-    yield [
-        "chart",
-        "series",
-        "variant",
-        "cost",
-        "low",
-        "high",
-        "cost_unit",
-        "error",
-        "error_unit",
-        "on_front",
-        "default",
-    ]
+    yield "chart series variant cost low high cost_unit error error_unit on_front default".split()
     for chart in charts:
         front = chart.front()
         for p in chart.points:
-            numbers = [f"{v:.6g}" for v in (p.cost, p.low, p.high)]
-            yield [
-                chart.title,
-                p.series,
-                p.variant,
-                *numbers,
-                chart.cost,
-                f"{p.error:.6g}",
-                chart.error,
-                int(p in front),
-                int(p.default),
-            ]
+            costs, error = [f"{v:.6g}" for v in (p.cost, p.low, p.high)], f"{p.error:.6g}"
+            marks = int(p in front), int(p.default)
+            yield [chart.title, p.series, p.variant, *costs, chart.cost, error, chart.error, *marks]
 
 
 def markdown(result: Result, facts: dict[str, str]) -> str:

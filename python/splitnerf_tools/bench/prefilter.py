@@ -30,12 +30,7 @@ TRUTH_CHUNK = 1 << 22
 QUADRATURE_FROM = 0.1  # roughness
 HARMONIC_RESOLUTION, ZONAL_ROWS = 64, 129
 HARMONICS = "spherical harmonics"
-SOURCES = (
-    "cpp/*prefilter*",
-    "cpp/*light*",
-    "python/splitnerf/ops/light.py",
-    "python/splitnerf/fields/light.py",
-)
+SOURCES = ("cpp/*prefilter*", "cpp/*light*", "python/splitnerf/ops/light.py", "python/splitnerf/fields/light.py")
 NARROWEST = 0.1  # least roughness at which the harmonics are measured
 
 Estimate = Callable[[Tensor, Tensor], Tensor]
