@@ -130,7 +130,7 @@ def test_charts_do_not_overlap_and_keep_their_distance():
     owner = owner.reshape(SIZE, SIZE)
     for c in range(n_charts):
         others = (owner >= 0) & (owner != c)
-        assert distance_transform_edt(~others)[owner == c].min() > PADDING
+        assert distance_transform_edt(~others)[owner == c].min() > PADDING / 2
     edges = uv[faces[:, 1:]] - uv[faces[:, :1]]
     area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]).sum()
     assert len(texels.index) == pytest.approx(area * SIZE**2, rel=0.01)  # each texel counted once

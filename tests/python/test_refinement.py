@@ -15,6 +15,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.errors import InputError
+from splitnerf.export.bake import rasterise
 from splitnerf.export.scene import write_environment
 from splitnerf.export.writers import write_glb
 from splitnerf.refinement import fit as fit_module
@@ -23,7 +24,7 @@ from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.refine import fitting_height
 from splitnerf.refinement.stage import refine
-from splitnerf.refinement.texels import AssetTexels, materials_of, patch_width
+from splitnerf.refinement.texels import AssetTexels, frames_of, materials_of, patch_width
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
 
@@ -164,6 +165,26 @@ def test_texels_know_their_points_on_the_mesh():
     read = torch.from_numpy(texels.positions)[texels.rows(at.footprints)] * at.footprints.weights[..., None]
     apart = (read.sum(1) - at.positions).norm(dim=1)
     assert texels.positions.shape == (len(texels.index), 3) and apart.median() < 1e-5 and apart.max() < 0.02
+
+
+def test_texels_on_both_sides_of_a_seam_are_neighbours():
+    """Along all seams, next to each other in space; a direction of space has one tilt, whichever frame it is told in."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    asset = textured(mesh.vertices, mesh.faces, 256)
+    texels = AssetTexels(asset)
+    chart, (i, j) = torch.from_numpy(texels.chart), texels.pairs.unbind(1)
+    seam = chart[i] != chart[j]
+    positions = torch.from_numpy(texels.positions)
+    apart = (positions[i] - positions[j]).norm(dim=1)
+    assert apart[seam].max() < 2.1 * apart[~seam].median()
+    ends = torch.bincount(texels.pairs[~seam].flatten(), minlength=len(chart)) < 4
+    joined = torch.zeros(len(chart), dtype=torch.bool).index_fill(0, texels.pairs[seam].flatten(), True)
+    assert joined[ends].float().mean() > 0.9
+    covered = rasterise(asset.uv, asset.triangles, texels.size)
+    axes = frames_of(*(covered.interpolate(x, asset.triangles) for x in (asset.normals, asset.tangents)))
+    tilts = torch.from_numpy(axes @ np.array([0.1, 0.05, -0.2])).float()  # of a direction nearly along the surface
+    turned = torch.einsum("kab,kb->ka", texels.frames, tilts[j])
+    assert (turned - tilts[i])[seam].abs().max() < 0.02  # what the surface bends between the two
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,8 @@ from stability.cases import drawn_directions
 def chain(**weights: float) -> Prior:
     """A prior of texels 0 - 1 - 2, with one weight for all unknowns."""
     of_all = {name: torch.full((N_UNKNOWNS,), weights.get(name, 0.0)) for name in ("smooth", "flat", "anchor", "like")}
-    return Prior(pairs=torch.tensor([[0, 1], [1, 2]]), groups=GROUPS, **of_all)
+    frames = torch.eye(2).expand(2, 2, 2)
+    return Prior(pairs=torch.tensor([[0, 1], [1, 2]]), frames=frames, groups=GROUPS, **of_all)
 
 
 def fitted(prior: Prior, observed: torch.Tensor, like: torch.Tensor, n_steps: int = 60) -> torch.Tensor:
@@ -41,6 +42,20 @@ def fitted(prior: Prior, observed: torch.Tensor, like: torch.Tensor, n_steps: in
         unknowns = unknowns + step
         equations.move(step)
     return unknowns
+
+
+def test_normals_across_a_seam_are_compared_in_one_frame():
+    """A tilt that is one direction of space in two frames, one of them turned, is no difference."""
+    frame = torch.tensor([[0.6, -0.8], [0.8, 0.6]])
+    prior = chain(flat=1.0)._replace(frames=torch.stack([frame, torch.eye(2)]))
+    observed = torch.zeros(3, N_UNKNOWNS)
+    observed[1:, 5:] = torch.tensor([0.3, -0.1])
+    observed[0, 5:] = frame @ observed[1, 5:]
+    torch.testing.assert_close(fitted(prior, observed, observed), observed)
+    values, rows = torch.randn(3, N_UNKNOWNS), torch.randn(2, N_UNKNOWNS)
+    torch.testing.assert_close(
+        (prior.differences(values) * rows).sum(), (values * prior.differences_adjoint(rows, 3)).sum()
+    )
 
 
 def test_small_differences_are_smoothed_and_edges_are_kept():

@@ -16,7 +16,7 @@ from splitnerf.export.bake import bake
 from splitnerf.export.simplify import decimate, is_closed
 from splitnerf.export.surface import Surface, surface_normals, to_level_set
 
-PADDING = 4  # texels between charts
+PADDING = 4  # texels between charts as packed, 2 at least in the texture: the packed area is up to twice as large
 CHARTS = 64  # no chart has more than 1 / CHARTS of the surface: its time rises with the square of its faces
 MIN_AGREEMENT = 0.2  # least cosine between the field's and the faces' normal; below it the faces' normal is used
 
@@ -117,7 +117,7 @@ def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[
     atlas.add_mesh(vertices, faces.astype(np.uint32))
     options = xatlas.PackOptions()
     options.resolution = texture_size
-    options.padding = 2 * PADDING  # the packed area is up to twice as large as requested
+    options.padding = PADDING
     options.bilinear = True
     charts = xatlas.ChartOptions()
     charts.max_chart_area = float(trimesh.Trimesh(vertices, faces, process=False).area) / CHARTS

@@ -144,6 +144,7 @@ class Refinement:
         smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         prior = Prior(
             pairs=self.texels.pairs,
+            frames=self.texels.frames,
             smooth=smooth,
             flat=per_unknown(*FLAT),
             groups=GROUPS,

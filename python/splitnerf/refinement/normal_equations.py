@@ -21,6 +21,7 @@ class Prior(NamedTuple):
 
     Attributes:
         pairs: [k, 2] int64, texels that are neighbours.
+        frames: [k, 2, 2] what takes the last two unknowns of the second of a pair into the frame of the first.
         smooth: [n] weight of the differences between the steps of neighbours.
         flat: [n] weight of the differences d between the values of neighbours; their cost is log(1 + (d / EDGE)^2), so
             that small differences are smoothed and edges are kept (Black and Anandan 1996).
@@ -30,6 +31,7 @@ class Prior(NamedTuple):
     """
 
     pairs: Tensor
+    frames: Tensor
     smooth: Tensor
     flat: Tensor
     groups: tuple[int, ...]
@@ -38,10 +40,22 @@ class Prior(NamedTuple):
 
     def flatness(self, unknowns: Tensor) -> Tensor:
         """[k, n] the weights by which squared differences have the gradient of their cost at unknowns [m, n]."""
-        i, j = self.pairs.unbind(1)
-        squared = ((unknowns[i] - unknowns[j]) / EDGE).square().split(self.groups, dim=1)
+        squared = (self.differences(unknowns) / EDGE).square().split(self.groups, dim=1)
         lengths = torch.cat([part.sum(1, keepdim=True).expand_as(part) for part in squared], dim=1)
         return self.flat / (1.0 + lengths)
+
+    def differences(self, values: Tensor) -> Tensor:
+        """[k, n] the differences of neighbours' values [m, n], in the frame of the first of a pair."""
+        i, j = self.pairs.unbind(1)
+        other = torch.einsum("kab,kb->ka", self.frames, values[j, -2:])
+        return values[i] - torch.cat([values[j, :-2], other], dim=1)
+
+    def differences_adjoint(self, values: Tensor, m: int) -> Tensor:
+        """[m, n] the transpose of :meth:`differences`, of values [k, n]."""
+        i, j = self.pairs.unbind(1)
+        other = torch.einsum("kab,ka->kb", self.frames, values[:, -2:])
+        sums = values.new_zeros(m, values.shape[1]).index_add_(0, i, values)
+        return sums.index_add_(0, j, -torch.cat([values[:, :-2], other], dim=1))
 
 
 def likeness(apart: Tensor) -> Tensor:
@@ -96,9 +110,7 @@ class NormalEquations:
 
     def _differences(self, values: Tensor, weights: Tensor) -> Tensor:
         """Gradient of half the weighted squared differences of neighbours."""
-        i, j = self.prior.pairs.unbind(1)
-        apart = (values[i] - values[j]) * weights
-        return torch.zeros_like(values).index_add_(0, i, apart).index_add_(0, j, -apart)
+        return self.prior.differences_adjoint(self.prior.differences(values) * weights, len(values))
 
     @torch.no_grad()
     def step(self, unknowns: Tensor, like: Tensor, n_iterations: int = 20) -> Tensor:

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -18,6 +19,11 @@ from splitnerf.data.lens import pixel_width
 from splitnerf.export.bake import Texels, nearest_rows, rasterise
 
 PATCH_PIXELS = 2.0  # width of a patch, in pixels of the photos
+SEAM_REACH, SEAM_CANDIDATES = (
+    2.0,
+    12,
+)  # of a texel across a seam, in widths of a texel; texels among which it is searched
+SEAM_COSINE = 0.7  # least cosine of the normals on both sides of a seam: the two sides of a sheet are no neighbours
 MIN_COSINE = 1e-3  # of a shading normal and the direction to the viewer
 N_CHANNELS = 8  # albedo 3, roughness, metallic, tangent-space normal 3
 
@@ -77,7 +83,8 @@ class AssetTexels:
         chart: [m] the number of each texel's chart.
         positions: [m, 3] the texels' points on the mesh.
         start: [m, 8] the texture's values.
-        pairs: [k, 2] int64 neighbours within a chart.
+        pairs: [k, 2] int64 neighbours within a chart, and the nearest texels of two charts along their seams.
+        frames: [k, 2, 2] what takes x and y of a tangent-space normal at the second of a pair into the frame of the first.
 
     Raises:
         ValueError: The asset has another form.
@@ -95,7 +102,13 @@ class AssetTexels:
         self.index, self.chart = covered.index, charts(asset)[asset.triangles[covered.triangle, 0]]
         self.positions = covered.interpolate(asset.vertices, asset.triangles)
         self.start = torch.from_numpy(values[covered.index])
-        self.pairs = torch.from_numpy(neighbours(covered, self.chart, self.size))
+        normals, tangents = (covered.interpolate(x, asset.triangles) for x in (asset.normals, asset.tangents))
+        inside = neighbours(covered, self.chart, self.size)
+        across = across_seams(inside, self.chart, self.positions, normals)
+        frames = frames_of(normals, tangents)
+        self.pairs = torch.from_numpy(np.concatenate([inside, across]))
+        turns = np.einsum("kax,kbx->kab", *(frames[end] for end in across.T))
+        self.frames = torch.from_numpy(np.concatenate([np.broadcast_to(np.eye(2), (len(inside), 2, 2)), turns])).float()
 
     def rows(self, footprints: Footprints) -> Tensor:
         """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest
@@ -191,6 +204,39 @@ def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) ->
         same = (chart_map[a] == chart_map[b]) & (chart_map[a] >= 0)
         pairs.append(np.stack([number[a][same], number[b][same]], axis=1))
     return np.concatenate(pairs)
+
+
+def across_seams(inside: np.ndarray, chart: np.ndarray, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """[k, 2] pairs of texels of different charts, each at the border of its own and the other the nearest one.
+
+    Args:
+        inside: [n, 2] neighbours within a chart.
+        chart: [m] the number of each texel's chart.
+        positions, normals: [m, 3] the texels' points and normals, these of any length.
+    """
+    spacing = (
+        np.median(np.linalg.norm(positions[inside[:, 0]] - positions[inside[:, 1]], axis=1)) if len(inside) else 0.0
+    )
+    border = np.flatnonzero(np.bincount(inside.ravel(), minlength=len(chart)) < 4)
+    if len(border) == 0 or spacing == 0:
+        return np.empty((0, 2), np.int64)
+    distances, found = cKDTree(positions[border]).query(
+        positions[border], SEAM_CANDIDATES, distance_upper_bound=SEAM_REACH * spacing
+    )
+    first, second = np.repeat(border, SEAM_CANDIDATES), np.append(border, -1)[found.ravel()]
+    near = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    good = np.isfinite(distances.ravel()) & (chart[first] != chart[second])
+    good &= (near[first] * near[second]).sum(axis=1) > SEAM_COSINE
+    nearest = np.full(len(chart), -1)
+    nearest[first[good][::-1]] = second[good][::-1]  # candidates stand by their distance: the first one stays
+    ends = np.flatnonzero(nearest >= 0)
+    return np.unique(np.sort(np.stack([ends, nearest[ends]], axis=1), axis=1), axis=0)
+
+
+def frames_of(normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+    """[m, 2, 3] the axes x and y of tangent space at texels with normals [m, 3] and tangents [m, 4], of any length."""
+    normals, x = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-20) for v in (normals, tangents[:, :3]))
+    return np.stack([x, np.cross(normals, x) * np.sign(tangents[:, 3:])], axis=1)
 
 
 def patch_width(dataset: Dataset, texels: AssetTexels) -> int:
