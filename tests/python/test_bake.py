@@ -1,6 +1,8 @@
-"""Unwrapping and baking: texels, padding, normal maps and occlusion against closed forms."""
+"""Unwrapping, tangents and baking: texels, padding, normal maps and occlusion against closed forms."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -9,12 +11,13 @@ import trimesh
 from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from splitnerf.data.asset import Asset, vertex_tangents
-from splitnerf.export import surface
+from splitnerf.data.asset import Asset, Material, vertex_tangents
+from splitnerf.export import bake, surface, writers
 from splitnerf.export.bake import bake_occlusion, rasterise
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
-from splitnerf.export.textured import PADDING, textured_asset, unwrap
+from splitnerf.export.textured import PADDING, textured_asset, unwrap, vertex_normals
+from splitnerf.export.writers import encode_maps
 
 SIZE = 256
 SPACING = 3.0 / 79
@@ -205,3 +208,175 @@ def test_occlusion_beside_a_wall():
     d = (np.arange(128) + 0.5) / 64
     expected = 1 - 0.5 * (1 - d / np.sqrt(d**2 + 1))
     assert occlusion.mean(axis=0)[8:-8] == pytest.approx(expected[8:-8], abs=0.02)
+
+
+# ---- parts of the export one by one ----
+
+
+def unwrapped(vertices, faces, normals, uv) -> Asset:
+    """An asset to bake."""
+    ids, tangents = np.zeros(len(faces), np.int32), vertex_tangents(vertices, faces, normals, uv)
+    return Asset("a", vertices, faces, normals, ids, uv=uv, tangents=tangents)
+
+
+def square() -> Asset:
+    """The unit square, z up, over the whole texture: x to the right, y down."""
+    vertices = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces, normals, uv = np.int32([[0, 1, 2], [0, 2, 3]]), np.float32([[0, 0, 1]] * 4), vertices[:, :2].copy()
+    return unwrapped(vertices, faces, normals, uv)
+
+
+def test_a_bake_in_bands_is_the_whole_one(monkeypatch):
+    """A field that differs from texel to texel, charts with a gap between them, and bands without a texel."""
+    uv = np.float32([[0.1, 0.1], [0.6, 0.15], [0.2, 0.4], [0.3, 0.7], [0.9, 0.75], [0.8, 0.95]])
+    vertices = np.column_stack([uv, np.zeros(6)]).astype(np.float32)
+    faces, normals = np.int32([[0, 1, 2], [3, 4, 5]]), np.float32([[0, 0, 1]] * 6)
+    mesh = unwrapped(vertices, faces, normals, uv)
+
+    def materials(x):
+        return x.abs(), x[:, :1], x[:, 1:2], torch.nn.functional.normalize(torch.tensor([0.2, 0.1, 1.0]) + x, dim=1)
+
+    floor = Surface(lambda x: x[:, 2], lambda x: (x[:, 2], torch.tensor([[0.0, 0.0, 1.0]]).expand_as(x)), materials)
+    whole = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
+    assert whole[0].roughness_metallic_texture[-1, -1] == pytest.approx([0.8, 0.95], abs=0.06)  # of the nearest corner
+    monkeypatch.setattr(bake, "BAND", 64 * 7)
+    parts = bake.bake(mesh, floor, 64, reach=0.1, offset=0.01)
+    for name in ("albedo_texture", "roughness_metallic_texture", "normal_texture"):
+        assert np.array_equal(getattr(whole[0], name), getattr(parts[0], name)), name
+    assert np.array_equal(whole[1], parts[1])
+
+
+def test_maps_encoded_in_bands_are_the_whole_ones(monkeypatch):
+    random = np.random.default_rng(0)
+    gloss, open_share = random.random((30, 20, 2), np.float32), random.random((30, 20), np.float32)
+    monkeypatch.setattr(writers, "BAND", 20 * 7)
+    pixels = writers.encoded(lambda *bands: np.dstack(bands), open_share, gloss)
+    assert np.array_equal(pixels, np.rint(np.dstack([open_share, gloss]) * 255).astype(np.uint8))
+
+
+def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
+    """A share that is x at x: at each texel's centre, but for the outer ones, which repeat what is next to them."""
+
+    def factors(scene, points, normals, *args, offset, **kwargs):
+        assert (
+            normals == torch.tensor([0.0, 0.0, 1.0])
+        ).all() and offset == 0.037  # traced off the surface along its normal
+        return points[:, :1], None
+
+    monkeypatch.setattr(bake, "occlusion_factors", factors)
+    found = bake_occlusion(square(), 64, 0.037)
+    x = (np.arange(64) + 0.5) / 64
+    np.testing.assert_allclose(found[:, 2:-2], np.broadcast_to(x[2:-2], (64, 60)), atol=1e-3)
+
+
+def test_charts_between_the_texels_are_refused():
+    mesh = dataclasses.replace(square(), uv=square().uv * np.float32(0.01) + np.float32(0.02))
+    assert (bake_occlusion(mesh, 8, 0.01) == 1).all()
+    with pytest.raises(RuntimeError, match="no texel of 8 x 8 lies in a chart; give a larger texture size"):
+        bake.bake(mesh, ball(), 8, reach=0.1, offset=0.01)
+
+
+def ball(radius: float = 0.8, sign: float = 1.0) -> Surface:
+    """|x| - radius; its gradient with a sign, and tilted towards +x."""
+
+    def field(x):
+        return x.norm(dim=1) - radius
+
+    def gradient(x):
+        return field(x), sign * torch.nn.functional.normalize(x + torch.tensor([0.3, 0.0, 0.0]), dim=1)
+
+    def materials(x):
+        half = torch.full((len(x), 1), 0.5)
+        return half.expand(-1, 3), half, half, torch.nn.functional.normalize(x, dim=1)
+
+    return Surface(field, gradient, materials)
+
+
+def test_normals_are_the_fields_where_they_agree_with_the_faces():
+    """Tilted ones are taken, opposite ones are not: those of the faces stand."""
+    mesh = trimesh.creation.icosphere(2, 0.8)
+    vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
+    tilted = vertices + np.float32([0.3, 0, 0])
+    tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
+    for slope in (1.0, 3.0):
+        np.testing.assert_allclose(vertex_normals(ball(sign=slope), vertices, faces), tilted, atol=1e-5)
+    np.testing.assert_allclose(vertex_normals(ball(sign=-1.0), vertices, faces), mesh.vertex_normals, atol=1e-5)
+    more, field = np.concatenate([vertices, np.float32([[0, 0.9, 0]])]), np.float32([0.3, 0.9, 0]) / 0.9**0.5
+    assert vertex_normals(ball(), more, faces)[-1] == pytest.approx(field, abs=1e-5)  # of no face
+    assert vertex_normals(ball(sign=0.0), more, faces)[-1].tolist() == [0, 0, 1]
+
+
+def textured() -> Asset:
+    material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
+    return dataclasses.replace(square(), materials=[material])
+
+
+def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
+    asset = textured()
+    assert (encode_maps("a", asset, None).orm[..., 0] == 255).all()
+    assert (encode_maps("a", asset, np.zeros((4, 4))).orm[..., 0] == 0).all()
+    asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
+    with pytest.raises(RuntimeError, match="finite"):
+        encode_maps("a", asset, None)
+
+
+# ---- tangents ----
+
+
+QUAD = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+UP = np.tile([0.0, 0.0, 1.0], (4, 1))
+
+
+def test_bitangent_points_up_in_the_texture():
+    """u along +x and, v counting downward, the texture's up along +y: an unmirrored frame."""
+    tangents = vertex_tangents(QUAD, FACES, UP, np.array([[0, 1], [1, 1], [1, 0], [0, 0]]))
+    assert tangents.dtype == np.float32
+    assert tangents == pytest.approx(np.tile([1, 0, 0, 1], (4, 1)), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("uv", "tangent", "sign"),
+    [
+        ([[0, 0], [1, 0], [1, 1], [0, 1]], [1, 0, 0], -1),  # v grows along +y: up is -y = -cross(z, x)
+        ([[1, 1], [0, 1], [0, 0], [1, 0]], [-1, 0, 0], -1),  # u mirrored, up is +y = -cross(z, -x)
+        ([[1, 1], [1, 0], [0, 0], [0, 1]], [0, -1, 0], 1),  # u along -y, up +x = cross(z, -y)
+    ],
+)
+def test_mirrored_and_turned_textures(uv, tangent, sign):
+    tangents = vertex_tangents(QUAD, FACES, UP, np.array(uv, float))
+    assert tangents == pytest.approx(np.tile([*tangent, sign], (4, 1)), abs=1e-6)
+
+
+def test_sphere_has_its_circles_of_latitude():
+    """u the longitude, v the colatitude: the tangent is d position / d longitude, the bitangent points north."""
+    rows, columns = 41, 80
+    theta, phi = np.meshgrid(np.linspace(0.3, np.pi - 0.3, rows), np.linspace(0, 6, columns), indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1).reshape(-1, 3)
+    a = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
+    faces = np.concatenate([np.stack([a, a + columns, a + columns + 1], 1), np.stack([a, a + columns + 1, a + 1], 1)])
+    tangents = vertex_tangents(points, faces, points, np.stack([phi / 6, theta / np.pi], -1).reshape(-1, 2))
+    expected = np.stack([-np.sin(phi), np.cos(phi), 0 * phi], -1).reshape(-1, 3)
+    inner = ((theta > 0.35) & (theta < 2.8) & (phi > 0.1) & (phi < 5.9)).reshape(-1)
+    assert np.abs(tangents[inner, :3] - expected[inner]).max() < 0.01
+    assert (tangents[:, 3] == 1).all()
+    assert np.abs((tangents[:, :3] * points).sum(axis=1)).max() < 1e-6
+    assert np.linalg.norm(tangents[:, :3], axis=1) == pytest.approx(1, abs=1e-6)
+
+
+def test_corners_weigh_by_their_angle():
+    """Two triangles about vertex 0 in one plane, 90 and 30 degrees, whose u run along +x and +y."""
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-s, c, 0]])
+    uv = np.array([[0, 0], [1, 0], [0, -1], [-1, -1]], float)
+    tangents = vertex_tangents(vertices, np.array([[0, 1, 2], [0, 2, 3]]), UP, uv)
+    # d position / d u of the second: p = a e1 + b e2 with uv = a (0, -1) + b (-1, -1), so u = -b and v = -a - b
+    second = np.array([0, 1, 0]) - np.array([-s, c, 0])
+    expected = np.pi / 2 * np.array([1, 0, 0]) + np.pi / 6 * second / np.linalg.norm(second)
+    assert tangents[0, :3] == pytest.approx(expected / np.linalg.norm(expected), abs=1e-6)
+
+
+def test_no_texture_area_still_gives_a_frame():
+    tangents = vertex_tangents(QUAD, FACES, UP, np.zeros((4, 2)))
+    assert np.isfinite(tangents).all()
+    assert (tangents[:, 2] == 0).all() and np.linalg.norm(tangents[:, :3], axis=1) == pytest.approx(1)

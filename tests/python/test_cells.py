@@ -1,4 +1,4 @@
-"""The cells of the sky: whose light they hold, where their shadows fall, and what the mesh reflects into them."""
+"""The cells of the sky: whose light they hold, and where their shadows fall."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import math
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, bits_of, grid_mesh, refresh, scene_of
+from mesh_shapes import OFFSET, bits_of, grid_mesh, scene_of
 from op_checks import generator, unit
-from splitnerf.fields import Light, LightPyramid, SkyCells
+from splitnerf.fields import LightPyramid, SkyCells
 from splitnerf.fields.light import octahedral_texels
-from splitnerf.ops import cached_visibility
 
 
 def lamp(axis: torch.Tensor, radiance: float = 1e4) -> LightPyramid:
@@ -94,39 +93,3 @@ def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():
             bits.light = sky.light(lit).radiance
             apart[aims].append((place(1 - bits(*query).diffuse[:, 0]) - place(shadow.float())).norm().item())
     assert max(apart[True]) < 0.01 and max(apart[False]) > 0.03
-
-
-# ---- what the mesh reflects into them ----
-
-
-class Field(Light):
-    """A light that does not depend on the roughness."""
-
-    def __init__(self, radiance):
-        super().__init__()
-        self.radiance = radiance
-
-    def forward(self, directions, roughness):
-        return self.radiance(directions)
-
-
-def floor_and_wall() -> trimesh.Trimesh:
-    """A floor about the origin, and a wall at x = 0.5 that faces it."""
-    floor, wall = grid_mesh(0.4, 8), grid_mesh(3.0, 40)
-    wall.apply_transform(trimesh.transformations.rotation_matrix(-math.pi / 2, (0, 1, 0)))
-    return trimesh.util.concatenate([floor, wall.apply_translation((0.5, 0, 0))])
-
-
-def test_a_mirror_sends_what_stands_in_the_mirror_direction():
-    """A wall of mirrors under a sky of colours: each direction brings the colour that it is mirrored to."""
-    mesh, sky = floor_and_wall(), Field(lambda w: 1.0 + 0.9 * w)
-    bits = bits_of(mesh, SkyCells(256).centres)
-    mirror = [torch.ones(1, 3), torch.full((1, 1), 0.05), torch.ones(1, 1)]
-    refresh(bits, sky, lambda x: [part.expand(len(x), -1) for part in mirror], lambda *args: args[5])
-    up = torch.tensor([[0.0, 0.0, 1.0]])
-    visible, sent = cached_visibility(bits.cache, torch.zeros(1, 3), up, bits.radiance)
-    w = bits.cache.directions
-    to_wall = (visible[0] == 0) & (w[:, 2] > 0.05) & (w[:, 0] > 0.3)
-    assert to_wall.sum() > 20
-    mirrored = w * torch.tensor([-1.0, 1.0, 1.0])
-    torch.testing.assert_close(sent[0, to_wall], sky.radiance(mirrored)[to_wall], rtol=0, atol=1e-4)

@@ -9,7 +9,6 @@ from painted_ball import sky
 from splitnerf import _core
 from splitnerf.data.environment import sample_environment
 from splitnerf.ops import monte_carlo_light
-from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
@@ -171,14 +170,6 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
         assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[few, 3] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
     assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
-
-
-def test_conjugate_gradients_solve_a_system():
-    random = torch.Generator().manual_seed(0)
-    factor = torch.randn(30, 30, generator=random)
-    matrix, right = factor @ factor.T + torch.eye(30), torch.randn(30, generator=random)
-    found = conjugate_gradients(lambda x: matrix @ x, lambda x: x / matrix.diagonal(), right, 60)
-    torch.testing.assert_close(found, torch.linalg.solve(matrix, right), rtol=1e-3, atol=1e-3)
 
 
 def test_the_equations_find_what_linear_observations_say():

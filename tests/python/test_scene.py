@@ -109,25 +109,3 @@ class TestHull:
             masks = disc.float().expand(40, -1, -1).clone()
             masks[:n_cut] *= y < 40
             assert bool(visual_hull(32, 1.5, masks, orbit(40), lenses)[inside].all()) == whole
-
-    def test_each_view_carves_by_its_own_mask_place_and_lens(self):
-        """Faint masks: the sphere from +x, and its upper half from +y by a lens of its own."""
-        size, distance = 160, 4.0
-        lenses = torch.tensor([[100.0, 100.0, 80.0, 80.0], [70.0, 90.0, 50.0, 100.0]])
-        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
-        masks = torch.stack(
-            [
-                ((x - cx) / fx) ** 2 + ((y - cy) / fy) ** 2 < RADIUS**2 / (distance**2 - RADIUS**2)
-                for fx, fy, cx, cy in lenses
-            ]
-        )
-        masks[1] &= y < lenses[1, 3]
-        hull = visual_hull(32, 1.5, 0.2 * masks.float(), orbit(4)[:2], lenses).reshape(-1)
-        centres = OccupancyGrid(32, 1.5).centres()
-        assert hull[(centres.norm(dim=1) < RADIUS) & (centres[:, 2] > 0)].all()
-        for beside in (
-            centres[:, 1:].norm(dim=1) - 0.4,
-            centres[:, ::2].norm(dim=1) - 0.4,
-            RADIUS - centres[:, 2] - 0.3,
-        ):
-            assert not hull[beside > RADIUS].any()

@@ -230,9 +230,8 @@ class TestReading:
         masks = write_ball_on_floor(tmp_path / "data", 8, alpha=alpha)
         for i, mask in enumerate(masks):
             small = mask.reshape(SIZE // 2, 2, SIZE // 2, 2).mean((1, 3))
-            write_image(
-                tmp_path / "found" / separated_mask(tmp_path / f"data/images/p{i}.png", tmp_path / "data"), small
-            )
+            name = separated_mask(tmp_path / f"data/images/p{i}.png", tmp_path / "data")
+            write_image(tmp_path / "found" / name, small)
         photos = load_dataset(tmp_path / "data", reading=Reading("all", separated=tmp_path / "found"))
         assert photos.masked
         agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
@@ -349,15 +348,14 @@ class TestFoot:
         heights = np.where(plinth, height, 0.0) + random.normal(size=len(at)) * noise
         points = at @ self.TABLE.axes + (self.TABLE.offset + heights)[:, None] * self.TABLE.normal
         colours = np.where(plinth[:, None], [0.3, 0.3, 0.3], 0.5 + 0.3 * np.sin(40 * at[:, :1] + [0, 1, 2]))
-        post = random.uniform(-0.1, 0.1, (500, 2)) @ self.TABLE.axes + (self.TABLE.offset + 0.3) * self.TABLE.normal
-        return points, colours, post
+        return points, colours, self.lifted(random.uniform(-0.1, 0.1, (500, 2)), 0.3)
+
+    def lifted(self, at: np.ndarray, height: float) -> np.ndarray:
+        return (at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32)
 
     def over(self, radius: float, height: float) -> torch.Tensor:
         angle = np.linspace(0, 2 * np.pi, 60)
-        at = radius * np.stack([np.cos(angle), np.sin(angle)], 1)
-        return torch.from_numpy(
-            (at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32)
-        )
+        return torch.from_numpy(self.lifted(radius * np.stack([np.cos(angle), np.sin(angle)], 1), height))
 
     def test_a_plinth_lower_than_the_noise_of_points_is_found(self):
         foot = find_foot(self.TABLE, *self.scene(0.012, 0.012))
@@ -385,9 +383,9 @@ class TestFoot:
         foot = find_foot(self.TABLE, points[~thin], colours[~thin], post)
         assert foot.holds(self.over(0.375, 0.0)).float().mean() > 0.9 and not foot.holds(self.over(0.45, 0.0)).any()
 
-    def test_without_a_plinth_it_is_what_stands_there(self):
-        foot = find_foot(self.TABLE, *self.scene(0.0, 0.003))
-        assert not foot.holds(self.over(0.2, 0.0)).any()
+    def test_without_a_plinth_or_points_it_holds_nothing(self):
+        for scene in (self.scene(0.0, 0.003), [np.zeros((0, 3))] * 3):
+            assert not find_foot(self.TABLE, *scene).holds(self.over(0.2, 0.0)).any()
 
     def test_below_an_overhang_points_decide_by_their_height(self):
         """No photo shows the table within 0.3 from above; the object hangs over it."""
@@ -395,10 +393,7 @@ class TestFoot:
         shown = np.linalg.norm(points @ self.TABLE.axes.T, axis=1) > 0.3
         random = np.random.default_rng(1)
         hanging = random.uniform(-0.4, 0.4, (4000, 2))
-        hanging = (
-            hanging[np.linalg.norm(hanging, axis=1) < 0.35] @ self.TABLE.axes
-            + (self.TABLE.offset + 0.3) * self.TABLE.normal
-        )
+        hanging = self.lifted(hanging[np.linalg.norm(hanging, axis=1) < 0.35], 0.3)
         foot = find_foot(self.TABLE, points[shown], colours[shown], hanging)
         assert foot.holds(self.over(0.2, 0.05)).all() and not foot.holds(self.over(0.2, 0.01)).any()
         assert not foot.holds(self.over(0.5, 0.05)).any()
@@ -407,9 +402,7 @@ class TestFoot:
         points, colours, post = self.scene(0.012, 0.003)
         apart = np.linalg.norm(points @ self.TABLE.axes.T - [0.6, 0.6], axis=1) < 0.1
         foot = find_foot(self.TABLE, points + apart[:, None] * 0.02 * self.TABLE.normal, colours, post)
-        beside = torch.from_numpy(
-            (np.array([[0.6, 0.6]]) @ self.TABLE.axes + self.TABLE.offset * self.TABLE.normal).astype(np.float32)
-        )
+        beside = torch.from_numpy(self.lifted(np.array([[0.6, 0.6]]), 0.0))
         assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
 
     @pytest.mark.parametrize("place, raised, held", [(0.36, -0.012, True), (0.44, 0.02, False)])
@@ -419,13 +412,8 @@ class TestFoot:
         at = points @ self.TABLE.axes.T
         wrong = (np.linalg.norm(at - [place, 0], axis=1) < 0.05) & ((np.linalg.norm(at, axis=1) < 0.4) == held)
         foot = find_foot(self.TABLE, points + wrong[:, None] * raised * self.TABLE.normal, colours, post)
-        asked = np.array([[place, 0.0]]) @ self.TABLE.axes + (self.TABLE.offset + 0.005) * self.TABLE.normal
-        assert bool(foot.holds(torch.from_numpy(asked.astype(np.float32)))) == held
+        assert bool(foot.holds(torch.from_numpy(self.lifted(np.array([[place, 0.0]]), 0.005)))) == held
         assert foot.holds(self.over(0.3, 0.0)).all() and not foot.holds(self.over(0.5, 0.01)).any()
-
-    def test_nothing_shown(self):
-        foot = find_foot(self.TABLE, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
-        assert not foot.holds(self.over(0.2, 0.0)).any()
 
     def test_the_region_goes_by_its_foot_near_the_table(self):
         points, colours, post = self.scene(0.012, 0.006)
