@@ -233,7 +233,7 @@ def test_a_step_agrees_with_float64(side, truth, monkeypatch, device):
         assert others.double().mean() <= OTHER_RAYS
         if device == "cuda":
             assert not beyond(true, on_cpu, answer(there, work, draws, tf32=True), TF32)
-        assert there.model.sums_light and not there.model.occlusion.is_unoccluded  # all caches were read
+        assert there.model.sums_light and there.model.bits and not there.model.is_unoccluded  # all caches were read
     terms = {"colour", "neutral", "light_prior", "entropy", "gradient of variance", "gradient of light.texels, level 2"}
     assert terms < true.numbers.keys() and true.numbers["colour"] != on_cpu.numbers["colour"]  # it was in float64
 

@@ -12,7 +12,6 @@ from pretend_gpu import pretend_gpu
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
-from splitnerf.fields import VisibilityBits
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import PixelSource
@@ -83,7 +82,7 @@ class Taken(NamedTuple):
 def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer.TrainedScene, list[Taken]]:
     """The schedule of preset fast in 160 steps on a pretended GPU. Before step 57 the surface becomes so blurred that rays find a half
     more samples. Memory that a mesh leaves when the next comes is overwritten."""
-    advance, poll, use = trainer.Training.advance, SurfaceMesh.poll, VisibilityBits.use
+    advance, poll, use = trainer.Training.advance, SurfaceMesh.poll, SceneModel.use_mesh
     steps = []
 
     def watched(training, bar):
@@ -95,10 +94,10 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         n_rays = len(taken.newest[0].target)
         steps.append(Taken(how, n_rays, len(taken._with_kernels), taken.skipped, training.mesh.made_at))
 
-    def leaving(bits, traced):
-        old = bits.cache
-        use(bits, traced)
-        for x in () if old is None else (old.vertices, old.normals):
+    def leaving(model, bits):
+        old = model.bits
+        use(model, bits)
+        for x in () if old is None or model.bits is old else (old.cache.vertices, old.cache.normals):
             x.fill_(torch.nan)
 
     with monkeypatch.context() as patch:
@@ -106,7 +105,7 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         patch.setattr(
             SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True)
         )  # which step takes it is no chance
-        patch.setattr(VisibilityBits, "use", leaving)
+        patch.setattr(SceneModel, "use_mesh", leaving)
         config = tiny(
             "fast",
             steps=160,
