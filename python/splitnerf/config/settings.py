@@ -12,7 +12,6 @@ from pathlib import Path
 import tomli_w
 
 from splitnerf.config import groups
-from splitnerf.config.constants import Constants
 from splitnerf.config.setting import LARGEST_FLOAT
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -47,7 +46,7 @@ class Config:
     losses: groups.LossesSettings = groups.LossesSettings()
     refinement: groups.RefinementSettings = groups.RefinementSettings()
     export: groups.ExportSettings = groups.ExportSettings()
-    constants: Constants = Constants()
+    constants: groups.Constants = groups.Constants()
 
     def __post_init__(self) -> None:
         for group, kind in GROUPS.items():
