@@ -26,7 +26,7 @@ TESTS = {
     "export/": "test_export.py test_bake.py test_meshing.py",
     "fields/": "test_heads.py test_scene.py test_shading_model.py",
     "fields/light.py": "test_light_parts.py test_light_pyramid.py test_light_mlp.py test_shading_model.py test_scene.py",
-    "fields/sdf.py": "test_sdf_field.py test_scene.py test_views.py",
+    "fields/surface.py": "test_sdf_field.py test_scene.py test_views.py",
     "fields/occlusion.py": "test_heads.py test_visibility_parts.py test_visibility.py test_summed_light.py test_correction.py",
     "render/": "test_views.py test_scene.py test_shading_model.py test_correction.py",
     "render/model.py": "test_views.py test_correction.py test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",

@@ -14,7 +14,7 @@ from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, 
 from op_checks import as_tuple, generator, lib, rand, unit
 from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
-from splitnerf.fields.sdf import SdfField
+from splitnerf.fields.surface import SdfField
 from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_averages, zonal_factors
 from torch.utils._pytree import tree_map
 

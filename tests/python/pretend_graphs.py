@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from typing import Any
 
 import torch
-from splitnerf.training import gpu_step, state
+from splitnerf.training import gpu_step, loop
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
 from torch.utils._pytree import tree_iter
@@ -161,7 +161,7 @@ def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
     monkeypatch.setattr(PretendGraph, "replay", counted_replay)
     monkeypatch.setattr(gpu_step.GpuStep, "differentiate", counted_differentiate)
     monkeypatch.setattr(gpu_step, "record", counted_record)
-    monkeypatch.setattr(state, "Step", gpu_step.GpuStep)
+    monkeypatch.setattr(loop, "Step", gpu_step.GpuStep)
     monkeypatch.setattr(torch.cuda, "Stream", NoStream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())

@@ -17,10 +17,8 @@ from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import exposed_like
 from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
-from splitnerf.render.edges import EdgePixels
-from splitnerf.render.rays import DrawnRays
 from splitnerf.training import exposure
-from splitnerf.training.batches import draw_batch
+from splitnerf.training.batches import DrawnRays, EdgePixels, draw_batch
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
 from tiny_runs import tiny, train
 

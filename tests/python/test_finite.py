@@ -13,7 +13,6 @@ import torch
 from splitnerf.cli import FAILED
 from splitnerf.data.dataset import load_dataset
 from splitnerf.training import loop as trainer
-from splitnerf.training import state
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged, check_state, explain_loss
 from splitnerf.training.gpu_step import GpuStep
@@ -31,7 +30,7 @@ def goes_on(data: Path, run: Path, before: bytes) -> None:
 @pytest.fixture(params=[Step, GpuStep])
 def kind(request, monkeypatch) -> type[Step]:
     """Runs take steps of this kind; those of a GPU are read late."""
-    monkeypatch.setattr(state, "Step", request.param)
+    monkeypatch.setattr(trainer, "Step", request.param)
     return request.param
 
 
@@ -39,12 +38,12 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
-    resumed = state.dataset_fingerprint
+    resumed = trainer.dataset_fingerprint
     images = np.array(dataset.images)
     images[2, 12, 12, 0] = np.nan
     dataset = replace(dataset, images=images)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(state, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
+        patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
         with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
             trainer.train(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
     goes_on(data, run, before)

@@ -14,10 +14,9 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
-from splitnerf.render.rays import PixelSource
-from splitnerf.training import gpu_step, state
+from splitnerf.training import gpu_step
 from splitnerf.training import loop as trainer
-from splitnerf.training.batches import draw_batch
+from splitnerf.training.batches import PixelSource, draw_batch
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.meshes import SurfaceMesh
@@ -128,7 +127,7 @@ def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(da
         shape = shape_of_ball(16)
         return type(shape)(shape.distance.to(hull.device), shape.trust.to(hull.device), shape.box)
 
-    monkeypatch.setattr(state, "start_shape", ball)  # the tiny photos are too few
+    monkeypatch.setattr(trainer, "start_shape", ball)  # the tiny photos are too few
     runs = []
     for name in ("recorded", "called"):
         runs.append(schedule_of_a_gpu(data, tmp_path / name, monkeypatch, recording, **{"surface.start": "stereo"})[0])

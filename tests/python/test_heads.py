@@ -11,7 +11,7 @@ from mesh_shapes import traced
 from op_checks import generator, unit
 from splitnerf import _core
 from splitnerf.fields import MaterialHead, Occlusion, OcclusionHead
-from splitnerf.fields.heads import relu_mlp
+from splitnerf.fields.surface import relu_mlp
 from splitnerf.render.model import SceneModel
 from tiny_runs import tiny
 

@@ -19,7 +19,7 @@ from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.refinement.outline import outline_pixels
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.render.occupancy import visual_hull
-from splitnerf.render.rays import PixelSource
+from splitnerf.training.batches import PixelSource
 
 OBJECT, IGNORE = Reading(mask_kind="object"), Reading(mask_kind="ignore")
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, hash_inputs, sampling_settings
 from op_checks import DEVICES, check_error, generator, lib
-from splitnerf.fields.sdf import SdfField
+from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, sample_rays
 
 DTYPES = [torch.float16, torch.bfloat16]

@@ -22,10 +22,9 @@ from splitnerf.data.pixels import Photos, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.ops import draw_rays
-from splitnerf.render.averages import averaging_factor, training_photos
-from splitnerf.render.masks import pixel_list, reduced, runs_of, widened
-from splitnerf.render.rays import PixelSource
+from splitnerf.render.occupancy import widened
 from splitnerf.training import loop
+from splitnerf.training.batches import PixelSource, averaging_factor, pixel_list, reduced, runs_of, training_photos
 from test_known_pixels import ignoring_scene
 from test_pixels import scene
 from tiny_runs import tiny
@@ -134,7 +133,7 @@ class Requests(list):
 
 def test_a_photo_is_asked_for_in_parts_that_the_system_takes_whole():
     requests = Requests()
-    pixels._ask_for(requests, start=5000, size=500_000)
+    pixels.ask_for(requests, start=5000, size=500_000)
     ends = [start + size for start, size in requests]
     assert all(size <= 128 * 1024 and start % 4096 == 0 for start, size in requests)
     assert [start for start, _ in requests] == [4096, *ends[:-1]]

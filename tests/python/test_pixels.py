@@ -16,9 +16,8 @@ from precision import precisions
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.ops import EdgeRuns, read_pixels
-from splitnerf.render.edges import EdgePixels, band, edge_of, filled_in
-from splitnerf.render.rays import DrawnRays, PixelSource, image_rays
-from splitnerf.training.batches import draw_batch
+from splitnerf.render.rays import image_rays
+from splitnerf.training.batches import DrawnRays, EdgePixels, PixelSource, band, draw_batch, edge_of, filled_in
 from tiny_runs import tiny
 
 HEIGHT, WIDTH = 20, 32

@@ -6,7 +6,7 @@ import pytest
 import torch
 from op_checks import generator, unit
 from splitnerf.fields import LightMlp, Occlusion
-from splitnerf.fields.sdf import SdfSample
+from splitnerf.fields.surface import SdfSample
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render import renderer
 from splitnerf.render.model import SceneModel

@@ -18,10 +18,9 @@ from splitnerf.data.images import read_image, write_image
 from splitnerf.data.truth import load_view_truths
 from splitnerf.errors import InputError
 from splitnerf.relight.cameras import data_views
-from splitnerf.render.averages import training_photos
-from splitnerf.render.edges import average_with_edges
-from splitnerf.render.rays import PixelSource, pixel_rays
+from splitnerf.render.rays import pixel_rays
 from splitnerf.render.seen import Cameras
+from splitnerf.training.batches import PixelSource, average_with_edges, training_photos
 from splitnerf.training.loop import Training
 from tiny_runs import tiny
 

@@ -14,7 +14,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
-from splitnerf.training import start, state
+from splitnerf.training import loop, start
 from splitnerf.training.loop import Training, train
 from splitnerf.training.start import CLEAR_SHARE, MARGIN, StartShape, exact_distances, fit_to, surface_depths
 from splitnerf_tools.synth.orbits import spiral
@@ -260,7 +260,7 @@ def test_a_field_takes_a_shape():
 
 
 def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
-    monkeypatch.setattr(state, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
+    monkeypatch.setattr(loop, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
     settings = {"surface.start": "stereo", "deterministic": True, "steps": 100}
     whole, part = tmp_path / "whole", tmp_path / "part"
     for run in (whole, part):

@@ -94,9 +94,9 @@ def test_no_module_imports_itself_in_a_circle(imports):
 
 def test_a_planted_import_is_found(imports):
     """Of the training in a field: it runs up the layers and closes a circle."""
-    planted = {**imports, "splitnerf.fields.sdf": imports["splitnerf.fields.sdf"] | {"splitnerf.training.loop"}}
-    assert wrong_way(planted) == ["splitnerf.fields.sdf imports splitnerf.training.loop"]
-    assert {"splitnerf.fields.sdf", "splitnerf.training.loop"} <= set(circle(planted))
+    planted = {**imports, "splitnerf.fields.surface": imports["splitnerf.fields.surface"] | {"splitnerf.training.loop"}}
+    assert wrong_way(planted) == ["splitnerf.fields.surface imports splitnerf.training.loop"]
+    assert {"splitnerf.fields.surface", "splitnerf.training.loop"} <= set(circle(planted))
 
 
 def test_a_planted_import_of_a_tool_is_found(imports):

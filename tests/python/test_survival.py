@@ -21,7 +21,7 @@ from splitnerf.cli.streams import lasting_streams
 from splitnerf.data.dataset import load_dataset
 from splitnerf.files import LOCK
 from splitnerf.progress import Interrupt, ended_by_signals
-from splitnerf.training import loop, state
+from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
 from test_files import held
@@ -243,7 +243,7 @@ def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, done, monkeypatc
     def fails(*_) -> None:
         raise MemoryError("32 TiB")
 
-    monkeypatch.setattr(state, "SceneModel", fails)
+    monkeypatch.setattr(loop, "SceneModel", fails)
     assert train(data, done, "--overwrite") == FAILED
     assert contents(done) == before
 

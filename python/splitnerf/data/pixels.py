@@ -88,7 +88,7 @@ class Photos:
         """Has the system begin to read photo i, where it is kept in a file."""
         if self.file is not None:
             size = self.codes.itemsize * int(np.prod(self.shape[1:]))
-            _ask_for(self.file, range(len(self))[i] * size, size)
+            ask_for(self.file, range(len(self))[i] * size, size)
 
     def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self[:], dtype)
@@ -100,34 +100,6 @@ class Photos:
             codes[i] = self.codes[view]
             forget_pages(codes)
         return Photos(codes, None if self.exposures is None else self.exposures[list(views)])
-
-
-class PixelReader:
-    """Reads single pixels of photos, on a device to which their numbers are copied.
-
-    Args:
-        photos: The photos.
-        device: The device.
-    """
-
-    def __init__(self, photos: Photos, device: torch.device):
-        codes = photos.codes
-        self.file = file_of(codes) if device.type == "cpu" else None
-        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # of which torch has more operations
-        self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
-
-    def __len__(self) -> int:
-        return len(self.codes)
-
-    def read(
-        self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: ops.EdgeRuns
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.read_pixels`."""
-        if self.file is not None:
-            size = 4 * self.codes.element_size()
-            for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
-                _ask_for(self.file, page * mmap.PAGESIZE, size)
-        return ops.read_pixels(self.codes, index, view, exposures, backgrounds, edges)
 
 
 def per_channel(exposures: np.ndarray) -> np.ndarray:
@@ -193,7 +165,7 @@ def forget_pages(array: np.ndarray) -> None:
         file.madvise(mmap.MADV_DONTNEED)
 
 
-def _ask_for(file: mmap.mmap, start: int, size: int) -> None:
+def ask_for(file: mmap.mmap, start: int, size: int) -> None:
     """Has the system begin to read bytes of a file, so that its pages are not waited for one by one."""
     begin, end = start - start % mmap.PAGESIZE, start + size
     for part in range(begin, end, READ_AHEAD):

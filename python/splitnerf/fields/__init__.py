@@ -1,9 +1,8 @@
 """The learned functions of space and direction: SDF, materials, occlusion factors and light."""
 
-from splitnerf.fields.heads import MaterialHead, OcclusionHead
 from splitnerf.fields.light import EvaluatedLight, Light, LightMlp, LightPyramid
 from splitnerf.fields.occlusion import Occlusion, RaySegments, SkyCells, VisibilityBits
-from splitnerf.fields.sdf import SdfField
+from splitnerf.fields.surface import MaterialHead, OcclusionHead, SdfField
 
 __all__ = [
     "EvaluatedLight",

@@ -3,7 +3,6 @@
 Each raises ValueError where a shape, dtype, number or name does not fit; the message names the operator and the argument.
 """
 
-from splitnerf.ops.adamw import AdamW
 from splitnerf.ops.light import (
     SparseMap,
     fibonacci_directions,
@@ -18,7 +17,6 @@ from splitnerf.ops.light import (
     sparse_product,
     zonal_factors,
 )
-from splitnerf.ops.losses import gradient_losses, pixel_losses, quadratic_entropy
 from splitnerf.ops.rays import (
     CELL_EMPTY,
     CELL_OCCUPIED,
@@ -58,6 +56,7 @@ from splitnerf.ops.shading import (
     summed_correction,
     summed_light,
 )
+from splitnerf.ops.training import AdamW, gradient_losses, pixel_losses, quadratic_entropy
 from splitnerf.ops.visibility import (
     IncomingLight,
     MeshScene,

@@ -24,7 +24,7 @@ from splitnerf.fields import (
     VisibilityBits,
 )
 from splitnerf.fields.light import lobe_roughness, mean_over
-from splitnerf.fields.sdf import SdfSample
+from splitnerf.fields.surface import SdfSample
 from splitnerf.ops import HashGridSpec, MeshScene, cached_occlusion, light_queries, split_sum_shade, summed_correction
 
 ENVIRONMENT_ROWS = 128  # of the image of a trained light

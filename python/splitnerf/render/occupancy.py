@@ -12,7 +12,6 @@ from torch.nn.functional import logsigmoid
 from splitnerf.config import Config
 from splitnerf.devices import start_fetching
 from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
-from splitnerf.render.masks import widened
 from splitnerf.render.rays import projected
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
@@ -177,3 +176,20 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
         misses[inside[seen]] += ~wide[row[seen], column[seen]]
         sights[inside[seen]] += 1
     return ((misses <= allowed) & (misses <= WRONG_MASKS * sights)).view((resolution,) * 3)
+
+
+def widened(mask: Tensor, radius: int) -> Tensor:
+    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns.
+
+    A mask that was widened by r, moved by up to r + 1 to both sides, leaves no gap: a few moves make any radius.
+    """
+    for axis in (0, 1):
+        reached = 0
+        while reached < min(radius, mask.shape[axis]):
+            step = min(radius - reached, reached + 1)
+            wide, size = mask.clone(), mask.shape[axis] - step
+            if size > 0:
+                wide.narrow(axis, step, size).logical_or_(mask.narrow(axis, 0, size))
+                wide.narrow(axis, 0, size).logical_or_(mask.narrow(axis, step, size))
+            mask, reached = wide, reached + step
+    return mask

@@ -1,17 +1,335 @@
-"""The rays of training steps."""
+"""The rays of training steps: the photos that they are drawn from, their masks' edges, and what they show there."""
 
 from __future__ import annotations
 
+import itertools
 import math
+import mmap
+from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from splitnerf.config import Config
-from splitnerf.data.pixels import at_unit_exposure
-from splitnerf.render.rays import PixelSource
+from splitnerf.data.dataset import Dataset
+from splitnerf.data.lens import pixel_width
+from splitnerf.data.pixels import Photos, ask_for, at_unit_exposure, averaged_codes, decoded, file_of
+from splitnerf.memory import give_back
+from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
+from splitnerf.render.occupancy import widened
+from splitnerf.render.rays import pixel_matrix
 from splitnerf.render.renderer import ProbePoints
+
+LEAST_EDGE = 8  # pixels along the shorter edge of an average
+
+
+def training_photos(dataset: Dataset, config: Config) -> Dataset:
+    """The photos themselves, or averages by the largest whole factor that `sampling.pixel_cells` allows.
+
+    A pixel of an average is the mean of its block in linear light, as in a smaller photo, also along the masks' edges.
+    Detail finer than the fields' cells is noise to them; the mean of a block has less of it than a pixel, at the same
+    cost of a step.
+
+    Args:
+        dataset: The train split.
+        config: The run's settings.
+    """
+    factor = averaging_factor(dataset, config)
+    if factor == 1:
+        return dataset
+    width = config.losses.edge_pixels
+    edges = partial(average_with_edges, width=width) if dataset.whole and width > 0 else None
+    return dataset.averaged(factor, config.data.max_memory, edges)
+
+
+def averaging_factor(dataset: Dataset, config: Config) -> int:
+    """The integer factor by which photos are averaged down for training; 1: none.
+
+    The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a
+    median over the photos.
+    """
+    box, most = config.constants.box, max(1, int(dataset.sizes.min()) // LEAST_EDGE)
+    pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)
+    cell = 2 * box / config.finest_cells
+    return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, most))
+
+
+PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
+BRIGHTEST = 250  # of 255: a brighter background may be clipped, so that the mask decides where the edge is
+
+
+class EdgePixels:
+    """The pixels within a band along the edges of the masks, where a mask is not trusted to a pixel.
+
+    There a pixel's colour is compared including the background: the object over the colour behind it, which is filled
+    in from outside the band. 24 bytes a run of neighbours and 3 a pixel.
+
+    Args:
+        photos: The result of :func:`edge_of` for each photo.
+        n_pixels: The number of pixels of a photo.
+        device: The device of lookups.
+
+    Attributes:
+        runs: The pixels and the colours behind the object there, at the photos' own exposures.
+    """
+
+    def __init__(
+        self, photos: list[tuple[tuple[np.ndarray, np.ndarray], np.ndarray]], n_pixels: int, device: torch.device
+    ):
+        starts, ends = joined([runs for runs, _ in photos], n_pixels)
+        before = np.cumsum(ends - starts) - (ends - starts)
+        behind = np.concatenate([behind for _, behind in photos])
+        self.runs = EdgeRuns(*(torch.from_numpy(x).to(device) for x in (starts, ends, before - starts, behind)))
+
+    def __len__(self) -> int:
+        return len(self.runs.behind)
+
+
+def edge_of(
+    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """The pixels of a photo within a band along its mask's edges as runs (see :func:`runs_of`),
+    and the sRGB colours [k, 3] uint8 behind the object there. Pixels in front of a clipped background are left out.
+
+    Args:
+        colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
+        alpha: [H, W] the mask, in [0, 1].
+        known: [H, W] bool, the valid pixels; None for all.
+        width: The pixels on each side of an edge.
+    """
+    near, behind = edge_mask(colours, alpha, known, width)
+    return runs_of(torch.from_numpy(near)), behind
+
+
+def edge_mask(
+    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels [H, W] bool and the colours [k, 3] of :func:`edge_of`, with the same arguments."""
+    near, outside = band(alpha, width)
+    if known is not None:
+        near, outside = near & known, outside & known
+    place, behind = filled_in(colours, near, outside, width)
+    scale = 255 if colours.dtype.kind == "f" else 255 / np.iinfo(colours.dtype).max
+    behind = (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
+    certain = behind.max(axis=1) < BRIGHTEST
+    near = np.zeros_like(near)
+    near.reshape(-1)[place[certain]] = True
+    return near, behind[certain]
+
+
+def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
+    """Averages a photo down as :class:`EdgePixels` compares it.
+
+    Along the mask's edges and outside of the mask, a pixel is the mean of object and background. The other pixels that
+    the object covers in part are means of the object alone: there the mask decides where the edge is.
+
+    Args:
+        photo: [H, W, 4] sRGB of a whole photo, and its mask.
+        factor: The edge of a block in pixels, at least 2.
+        known: [H // factor, W // factor] bool, the valid averages; None for all.
+        width: The pixels of the average on each side of an edge.
+
+    Returns:
+        [H // factor, W // factor, 4] uint16.
+    """
+    result, whole = (averaged_codes(photo, factor, object_alone=alone) for alone in (True, False))
+    whole, alpha = whole[..., :3], decoded(result[..., 3])
+    shown = edge_mask(whole, alpha, known, width)[0] | (alpha <= PARTLY[0])
+    result[shown, :3] = whole[shown]
+    return result
+
+
+def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """[H, W] bool each: the pixels within `width` of the edge of a mask [H, W], and those more than twice as far
+    outside it, which the object does not touch where the mask is wrong by no more than the band is wide."""
+    inside, partly = torch.from_numpy(alpha > 0.5), torch.from_numpy((alpha > PARTLY[0]) & (alpha < PARTLY[1]))
+    near = (widened(inside, width) & widened(~inside, width)) | partly
+    return near.numpy(), (~widened(inside | partly, 2 * width) & ~near).numpy()
+
+
+def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a
+    Gaussian, over every third pixel in both directions.
+
+    Args:
+        colours: [H, W, 3].
+        near, outside: [H, W] bool.
+        size: Half the width of the band in pixels, which is the Gaussian's deviation.
+    """
+    height, width = near.shape
+    reach = 3 * (size + 1)
+    step = np.arange(-reach, reach + 1, 3)
+    weights = np.exp(-0.5 * (step[:, None] ** 2 + step**2) / size**2).astype(np.float32).ravel()
+    place = np.flatnonzero(near)
+    total, sums = np.zeros(len(place), np.float32), np.zeros((len(place), 3), np.float32)
+    row, column = place // width, place % width
+    for (dy, dx), weight in zip(itertools.product(step, step), weights):
+        y, x = (row + dy).clip(0, height - 1), (column + dx).clip(0, width - 1)
+        at = outside[y, x].nonzero()[0]
+        total[at] += weight
+        sums[at] += weight * colours[y[at], x[at]]
+    seen = total > 0
+    return place[seen], sums[seen] / total[seen, None]
+
+
+def reduced(mask: Tensor, factor: int) -> Tensor:
+    """[H // factor, W // factor] bool, the blocks with a pixel of `mask` [H, W] in them; incomplete blocks are
+    cropped."""
+    height, width = mask.shape[0] // factor, mask.shape[1] // factor
+    blocks = mask[: height * factor, : width * factor].reshape(height, factor, width, factor)
+    return blocks.any(dim=3).any(dim=1)
+
+
+def pixel_list(runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int, device: torch.device) -> PixelList:
+    """The pixels in runs (see :func:`runs_of`) of photos with as many pixels: 16 bytes a run in place of 8 a pixel."""
+    starts, ends = joined(runs, n_pixels)
+    last = np.cumsum(ends - starts)
+    of_runs = (torch.from_numpy(x).to(device) for x in (last, ends - last))
+    return PixelList(*of_runs, int(last[-1]) if len(last) else 0)
+
+
+def joined(runs: list[tuple[np.ndarray, np.ndarray]], n_pixels: int) -> tuple[np.ndarray, np.ndarray]:
+    """The runs of photos with as many pixels, their pixels counted through all photos."""
+    starts, ends = (np.concatenate([run[k] + i * n_pixels for i, run in enumerate(runs)]) for k in (0, 1))
+    return starts, ends
+
+
+def runs_of(mask: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """The first pixels of the runs of ones in a mask [H, W] bool, row by row, and the pixels after their last."""
+    flat = mask.cpu().numpy().reshape(-1)
+    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    changes = np.concatenate([[0] if flat[0] else [], changes, [len(flat)] if flat[-1] else []]).astype(np.int64)
+    return changes[::2], changes[1::2]
+
+
+HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
+
+
+class PixelReader:
+    """Reads single pixels of photos, on a device to which their numbers are copied.
+
+    Args:
+        photos: The photos.
+        device: The device.
+    """
+
+    def __init__(self, photos: Photos, device: torch.device):
+        codes = photos.codes
+        self.file = file_of(codes) if device.type == "cpu" else None
+        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # of which torch has more operations
+        self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def read(
+        self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: EdgeRuns
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.read_pixels`."""
+        if self.file is not None:
+            size = 4 * self.codes.element_size()
+            for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
+                ask_for(self.file, page * mmap.PAGESIZE, size)
+        return read_pixels(self.codes, index, view, exposures, backgrounds, edges)
+
+
+class DrawnRays(NamedTuple):
+    """Rays through pixels of photos.
+
+    Attributes:
+        rays_o, rays_d: [n, 3] origins and unit directions.
+        pixels: [n, 4] sRGB of the photos as they are, in [0, 1], straight alpha.
+        view: [n] int64, the photos' numbers.
+        exposure: [n, 3] the factors of the photos' linear values.
+        background: [n, 3] sRGB colours behind the pixels; at edges the photo's background, filled in.
+        whole: [n] bool, the pixels along the masks' edges.
+    """
+
+    rays_o: Tensor
+    rays_d: Tensor
+    pixels: Tensor
+    view: Tensor
+    exposure: Tensor
+    background: Tensor
+    whole: Tensor
+
+
+class PixelSource:
+    """Draws training rays: most of them near the objects' masks, the rest anywhere.
+
+    Args:
+        dataset: The train split; invalid pixels are never drawn.
+        foreground_share: Share of the rays, in [0, 1], that are drawn within a few pixels of a mask.
+        generator: The random generator of the pixels; images and cameras are kept on its device.
+        edge_pixels: The width on each side of the masks' edges in pixels of `edges`; 0: none.
+
+    Attributes:
+        edges: The pixels along the masks' edges; None where there are none, or the photos have no colours outside.
+        turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`, or None.
+        foreground, known: The valid pixels near a mask, and all valid pixels.
+        possible: [n, h, w] bool, where the photos may show the object: within the masks, and at invalid pixels. Those
+            of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
+    """
+
+    def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0):
+        self.device = generator.device
+        self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
+        self.pixels = PixelReader(dataset.images, self.device)
+        self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns).to(self.device)
+        self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
+        self.height, self.width = dataset.height, dataset.width
+        self.share, self.generator = foreground_share, generator
+        near, known, possible, edges = [], [], [], []
+        self.hull_factor = max(1, min(self.height, self.width) // HULL_EDGE)
+        for i in range(len(dataset)):
+            alpha, known_here = dataset.images[i, ..., 3], None
+            mask = torch.from_numpy(alpha > 0)
+            wide, seen = widened(mask, max(2, self.width // 50)), mask
+            if dataset.known is not None:
+                known_here = torch.from_numpy(np.array(dataset.known[i]))
+                wide, seen = wide & known_here, mask | ~known_here
+                known.append(runs_of(known_here))
+            if edge_pixels and dataset.whole:
+                known_here = None if known_here is None else known_here.numpy()
+                edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels))
+            near.append(runs_of(wide))
+            possible.append(reduced(seen, self.hull_factor))
+            del alpha, mask, wide, seen, known_here
+            # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
+            give_back()
+        self.possible = torch.stack(possible).to(self.device)
+        n_pixels = self.height * self.width
+        self.foreground = pixel_list(near, n_pixels, self.device)
+        n_all = n_pixels * len(dataset)
+        self.known = pixel_list(known, n_pixels, self.device) if known else PixelList.all(n_all, self.device)
+        has_edges = any(len(behind) for _, behind in edges)
+        self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
+        self._no_edges = EdgeRuns.none(self.device)
+
+    def draw(
+        self, n: int, random: Tensor | None = None, backgrounds: Tensor | None = None, exposures: Tensor | None = None
+    ) -> DrawnRays:
+        """Draws n rays; see :func:`splitnerf.ops.draw_rays`.
+
+        Args:
+            n: The number of rays.
+            random: [n] in [0, 1); None: drawn by the generator.
+            backgrounds: [n, 3] sRGB colours behind the pixels that are not at edges; None: black.
+            exposures: [views, 3] the photos' factors; None: 1.
+        """
+        n_near = int(n * self.share) if self.foreground.count else 0
+        if random is None:
+            random = torch.rand(n, generator=self.generator, device=self.device)
+        backgrounds = random.new_zeros(n, 3) if backgrounds is None else backgrounds
+        exposures = torch.ones_like(self.origins) if exposures is None else exposures
+        rays_o, rays_d, view, index = draw_rays(
+            random, n_near, self.foreground, self.known, self.matrices, self.origins, self.height, self.width
+        )
+        edges = self._no_edges if self.edges is None else self.edges.runs
+        pixels, *beside = self.pixels.read(index, view, exposures, backgrounds, edges)
+        return DrawnRays(rays_o, rays_d, pixels, view, *beside)
 
 
 class Batch(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -12,15 +13,74 @@ from splitnerf.config import Config
 from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensors
 from splitnerf.errors import InputError
 from splitnerf.ops.sdf import HashGridSpec
+from splitnerf.refinement.refine import STATE
 from splitnerf.render.model import N_FEATURES
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.seen import Cameras
-from splitnerf.training.start import StartShape
+from splitnerf.training.start import HELD_UNTIL, StartShape
 
 FORMAT = 1
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
 CACHED_LIGHT = {"sky", "aims", "sent", "emitters"}
+
+
+def save(training: Any) -> None:
+    """Writes the checkpoint of a :class:`splitnerf.training.loop.Training`."""
+    t, start = training, training.take_step.start if training.progress < HELD_UNTIL else None
+    state = dict(
+        step=t.step,
+        seconds=t.seconds,
+        n_rays=t.n_rays,
+        previewed_at=t.previewed_at,
+        stopped=t.stopped,
+        psnr_mean=t.log.psnr,
+        exposures=t.exposures.sums,
+        model=t.model.state_dict(),
+        optimiser={"state": t.optimiser.state_dict()["state"]},  # the rates are those of settings and step
+        device=t.generator.device.type,
+        generator=t.generator.get_state(),
+        torch_generator=torch.get_rng_state(),
+        occupancy=t.grid.values,
+        cells=t.grid.cells,
+        environment=t.environment,
+        light_noise=t.model.light.loss_samples.state(),
+        box_from_world=torch.from_numpy(t.dataset.box_from_world),
+        start=None if start is None else start.state(),
+        cameras=Cameras.of(t.dataset)._asdict(),
+        light_turns=t.source.turns,
+        **t.mesh.state(),
+    )
+    save_checkpoint(t.run / "checkpoint.pt", config=t.config, fingerprint=t.fingerprint, state=state)
+
+
+def restore(training: Any) -> None:
+    """Puts the state of its run's checkpoint into a :class:`splitnerf.training.loop.Training`.
+
+    Raises:
+        InputError: The checkpoint cannot be read, or belongs to other images or settings.
+    """
+    t, path = training, training.run / "checkpoint.pt"
+    content = load_checkpoint(path)
+    check_same_scene(content, t.fingerprint, t.run)
+    restore_model(t.model, content, path)
+    restore_optimiser(t.optimiser, content, path)
+    restore_generator(t.generator, content, path)
+    t.grid.values, t.grid.cells = restored_grid(t.grid, content, path)
+    t.model.light.loss_samples.restore(content["light_noise"].tolist())
+    if content["environment"] is not None:
+        t.environment = content["environment"].to(t.grid.device)
+    t.step, t.seconds, t.n_rays, t.previewed_at = (content[x] for x in ("step", "seconds", "n_rays", "previewed_at"))
+    t.log.psnr = content["psnr_mean"]
+    # A run that was stopped for its export goes on with the export's refinement; one that has it trains on.
+    t.stopped = content["stopped"] and (t.run / STATE).is_file()
+    if t.exposures.learned:
+        t.exposures.restore(content["exposures"])
+    if content.get("start") is not None:
+        tensors = {name: x.to(t.grid.device) for name, x in content["start"].items()}
+        t.take_step.start = StartShape(box=t.config.constants.box, **tensors)
+    t.model.open_levels(t.progress)
+    t.mesh.restore(content)
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:

@@ -10,22 +10,36 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset
-from splitnerf.devices import same_bits, spare_processors, tensor_cores
-from splitnerf.errors import InputError
+from splitnerf.data.dataset import Dataset, dataset_fingerprint
+from splitnerf.devices import let_segments_grow, same_bits, spare_processors, tensor_cores
+from splitnerf.errors import InputError, note_once
+from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import MeshScene
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid
-from splitnerf.training.batches import draw_batch
+from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
+from splitnerf.training.batches import PixelSource, draw_batch, training_photos
+from splitnerf.training.checkpoint import restore, save
+from splitnerf.training.exposure import PhotoExposures
 from splitnerf.training.finite import check_state, explain_loss
-from splitnerf.training.metrics import METRICS, keep_metrics, write_preview
-from splitnerf.training.observer import Event, Request
-from splitnerf.training.schedule import light_moves, next_ray_count, set_learning_rate
-from splitnerf.training.state import TrainingState
-from splitnerf.training.step import StepNumbers
+from splitnerf.training.gpu_step import GpuStep
+from splitnerf.training.losses import SeenLight
+from splitnerf.training.meshes import SurfaceMesh
+from splitnerf.training.metrics import METRICS, StepLog, keep_metrics, write_preview
+from splitnerf.training.observer import NOBODY, Event, Observer, Request
+from splitnerf.training.schedule import (
+    light_moves,
+    light_period,
+    make_optimiser,
+    next_ray_count,
+    progress_of,
+    set_learning_rate,
+)
+from splitnerf.training.start import fit_to, start_shape
+from splitnerf.training.step import Step, StepNumbers
 
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
@@ -75,8 +89,97 @@ def train(
     return training.complete()
 
 
-class Training(TrainingState):
-    """A training as it runs; see :class:`TrainingState` for the arguments."""
+class Training:
+    """A training: its scene, optimiser and schedule, and the loop over its steps.
+
+    Args:
+        dataset, config, run, device: See :func:`train`.
+        observer: Learns what happens, and may request something between two steps.
+    """
+
+    def __init__(self, dataset: Dataset, config: Config, run: Path, device: torch.device, observer: Observer = NOBODY):
+        c = self.config = config
+        if (
+            device.type == "cuda" and c.sampling.min_weight == 0 and not c.run.cuda_graphs
+        ):  # each step has tensors of new sizes
+            let_segments_grow()
+        self.dataset, self.run, self.observer = dataset, run, observer
+        self.fingerprint = dataset_fingerprint(dataset)
+        torch.manual_seed(c.run.seed)
+        self.generator = torch.Generator(device).manual_seed(c.run.seed)
+        self.photos = training_photos(dataset, c)
+        self.source = source = PixelSource(
+            self.photos, c.constants.foreground_share, self.generator, c.losses.edge_pixels
+        )
+        self.exposures = PhotoExposures(dataset, c, device)
+        self.model = SceneModel(c).to(device)
+        self.optimiser = make_optimiser(self.model, c)
+        self.hull = None
+        if c.constants.hull_until > 0 or c.surface.start == "stereo":
+            lenses = source.intrinsics / source.hull_factor
+            self.hull = visual_hull(c.sampling.grid_resolution, c.constants.box, source.possible, source.poses, lenses)
+        self.grid = make_grid(c, self.hull, device)
+        self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
+        step = Step if device.type == "cpu" else GpuStep
+        still = self.source.turns is None
+        seen = SeenLight(dataset.surroundings, device) if still and dataset.surroundings is not None else None
+        self.model.use_turns(self.source.turns)
+        self.take_step = step(self.model, self.grid, self.mesh, self.generator, self.optimiser, self.exposures, seen)
+        self.take_step.turns = source.turns
+        self.light: EvaluatedLight | None = None  # evaluated; None after its parameters moved
+        self.environment: Tensor | None = None  # the light that weighs traced occlusion
+        self.step, self.seconds, self.n_rays, self.previewed_at = 0, 0.0, c.constants.initial_rays, 0.0
+        self.log = StepLog(run)
+        self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
+        self.first = True  # step of the run
+        self.stopped = False  # the observer requested the end before the schedule does
+        self.resumed_at = 0
+
+    def begin(self, resume: bool = False) -> None:
+        """Goes on from the run's checkpoint, or fits the surface to the shape that stereo finds, near which it is held at
+        first."""
+        c = self.config
+        if resume:
+            self.restore()
+        elif c.surface.start == "stereo":
+            note_once("the photos are compared to find a first shape")
+            with same_bits(c.run.deterministic):
+                self.model.open_levels(0.0)
+                self.take_step.start = start = start_shape(self.photos, self.hull, c)
+                if start is not None:
+                    fit_to(self.model.sdf_field, start, self.generator, c)
+
+    @property
+    def progress(self) -> float:
+        """The progress of the schedule, in [0, 1]."""
+        return progress_of(self.config, self.step, self.seconds)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run delivers what it has: at the end of the schedule, or as the observer requested."""
+        return self.stopped or self.progress >= 1.0
+
+    @property
+    def may_stop(self) -> bool:
+        """Whether no gradients of the light are pending."""
+        return self.step % light_period(self.config) == 0
+
+    def save(self) -> None:
+        """Writes the checkpoint.
+
+        Raises:
+            Diverged: A parameter is not finite; the old checkpoint is kept.
+        """
+        self.settle()
+        check_state(self.step, self.model, self.optimiser)
+        self.saved_at = self.seconds
+        save(self)
+
+    def restore(self) -> None:
+        """Restores the state from the run's checkpoint."""
+        restore(self)
+        self.first, self.resumed_at = self.step == 0, self.step
+        self.started, self.saved_at = time.monotonic() - self.seconds, self.seconds
 
     def complete(self) -> TrainedScene:
         """Trains to the end of the schedule, or until a signal or the observer requests the end."""

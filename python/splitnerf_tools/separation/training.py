@@ -9,7 +9,7 @@ from collections.abc import Callable
 import torch
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import at_unit_exposure, per_channel
-from splitnerf.render.rays import PixelSource
+from splitnerf.training.batches import PixelSource
 from torch.nn.functional import smooth_l1_loss
 
 from splitnerf_tools.separation.field import RadianceField, search_loss, spread_loss
