@@ -9,7 +9,7 @@ from blender_data import look_at
 from PIL import Image
 
 BALL, RADIUS = np.array([0.0, 0.0, 0.5]), 0.5
-TABLE_RADIUS = 1.6
+TABLE_RADIUS, TURNTABLE_RADIUS = 1.6, 0.9
 CAMERA = (400.0, 400, 300)  # focal length, width and height in pixels
 
 
@@ -54,29 +54,33 @@ def surface_colours(at_table: np.ndarray, rays: np.ndarray, table: np.ndarray, f
 
 
 def photograph(
-    pose: np.ndarray, focal: float, width: int, height: int, frequency: float = 5.0
+    pose: np.ndarray, focal: float, width: int, height: int, frequency: float = 5.0, turntable: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A photo [h, w, 3] uint8 with the principal point in its middle, and the ball's mask [h, w] bool."""
+    """A photo [h, w, 3] uint8 with the principal point in its middle, and the ball's mask [h, w] bool. On a turntable all
+    that is around the table stands still before the camera, and has edges."""
     y, x = np.mgrid[:height, :width] + 0.5
     local = np.stack([(x - width / 2) / focal, -(y - height / 2) / focal, -np.ones_like(x)], axis=-1)
     rays = local @ pose[:3, :3].T
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     origin = pose[:3, 3]
+    radius = TURNTABLE_RADIUS if turntable else TABLE_RADIUS
     along = -((origin - BALL) * rays).sum(-1)
     inside = RADIUS**2 - (((origin - BALL) ** 2).sum() - along**2)
     ball = inside > 0
     at_ball = origin + (along - np.sqrt(np.maximum(inside, 0)))[..., None] * rays
     at_table = origin - (origin[2] / rays[..., 2])[..., None] * rays
-    table = (rays[..., 2] < 0) & (np.linalg.norm(at_table[..., :2], axis=-1) < TABLE_RADIUS)
+    table = (rays[..., 2] < 0) & (np.linalg.norm(at_table[..., :2], axis=-1) < radius)
     colour = surface_colours(at_table, rays, table, frequency)
+    if turntable:
+        colour[~table] = painted(local[~table], 3, 8.0)
     colour[ball] = painted(at_ball[ball], 5) * [1.0, 0.4, 0.2]
     return (255 * colour.clip(0, 1) + 0.5).astype(np.uint8), ball
 
 
-def write_photos(folder: Path, n: int) -> np.ndarray:
+def write_photos(folder: Path, n: int, turntable: bool = False) -> np.ndarray:
     """Writes `p_NN.png`; returns the poses."""
     folder.mkdir(parents=True)
     poses = ring(n)
     for i, pose in enumerate(poses):
-        Image.fromarray(photograph(pose, *CAMERA)[0]).save(folder / f"p_{i:02d}.png")
+        Image.fromarray(photograph(pose, *CAMERA, turntable=turntable)[0]).save(folder / f"p_{i:02d}.png")
     return poses

@@ -287,18 +287,19 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
+@pytest.mark.parametrize("turntable", [False, True], ids=["around", "turntable"])
 @pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_photos_to_data(tmp_path, capsys, given):
+def test_photos_to_data(tmp_path, capsys, given, turntable):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""
     n = 12 if given else 20
-    truth = write_photos(tmp_path / "photos", n)
+    truth = write_photos(tmp_path / "photos", n, turntable)
     (tmp_path / "masks").mkdir()
     for path, pose in zip(sorted((tmp_path / "photos").iterdir()), truth):
         Image.fromarray(255 * photograph(pose, *CAMERA)[1].astype(np.uint8)).save(
             tmp_path / "masks" / f"{path.stem}.png"
         )
-    masks = ["--masks", str(tmp_path / "masks")] if given else []
-    assert main(["prepare", str(tmp_path / "photos"), *masks, "--out", str(tmp_path / "data")]) == 0
+    options = (["--masks", str(tmp_path / "masks")] if given else []) + (["--turntable"] if turntable else [])
+    assert main(["prepare", str(tmp_path / "photos"), *options, "--out", str(tmp_path / "data")]) == 0
     assert f"{n} of {n} photos" in capsys.readouterr().out
     frames = json.loads((tmp_path / "data" / "transforms.json").read_text())["frames"]
     poses = np.array([frame["transform_matrix"] for frame in frames])
@@ -308,6 +309,7 @@ def test_photos_to_data(tmp_path, capsys, given):
     )
     assert np.ptp(angle) < 0.01
     assert np.allclose(poses[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
+    assert all(("light_rotation" in frame) == turntable for frame in frames)
     overlap = []
     for frame, pose in zip(frames, truth):
         mask = np.asarray(Image.open(tmp_path / "data" / frame["mask_path"])) > 127

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from blender_data import edit, make_blender
+from blender_data import edit, look_at, make_blender
 from painted_ball import lamps, photos, textured
 from scipy.spatial.transform import Rotation
 from splitnerf.cli import DONE, main
@@ -24,6 +24,7 @@ from splitnerf.fields.light import mean_over
 from splitnerf.pipeline import load_run
 from splitnerf.refinement.fit import FitSettings, Refinement, groups_of
 from splitnerf.render.renderer import render_view
+from splitnerf_tools.capture.turntable import light_turns, moving_pixels
 from splitnerf_tools.synth.rendering import turn_to
 from test_views import LENS, POSE, SIZE, ball
 from tiny_runs import SMALL, as_options
@@ -32,6 +33,37 @@ from tiny_runs import SMALL, as_options
 def about_z(*degrees: float) -> np.ndarray:
     """[n, 3, 3] float32 rotations."""
     return Rotation.from_euler("z", np.reshape(degrees, (-1, 1)), degrees=True).as_matrix().astype(np.float32)
+
+
+def test_the_light_turns_as_the_camera_seems_to():
+    """Each camera stands, in the light's frame, at one azimuth: level ones, one that looks down, one that is rolled."""
+    heights = np.radians([0, 30, 60, 89.9, 45])
+    azimuths = np.radians([0, 100, 200, 300, -40])
+    back = np.stack([np.cos(azimuths) * np.cos(heights), np.sin(azimuths) * np.cos(heights), np.sin(heights)], axis=1)
+    poses = np.stack([look_at(3 * b, np.zeros(3)) for b in back])
+    poses[4, :3, :3] = poses[4, :3, :3] @ about_z(90)[0]  # a phone on its side
+    turns = light_turns(poses)
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (5, 3, 3)), atol=1e-12)
+    seen = np.einsum("nij,nj->ni", turns, back)
+    np.testing.assert_allclose(seen, np.stack([np.cos(heights), 0 * heights, np.sin(heights)], axis=1), atol=1e-6)
+
+
+def test_what_turns_before_a_backdrop_is_found():
+    """A square of noise that is elsewhere in each photo, before noise that stands still, from two heights of the stand."""
+    random = np.random.default_rng(0)
+    views, squares = [], []
+    for height in range(2):
+        backdrop = random.integers(0, 256, (60, 80, 3)).astype(np.uint8)
+        for k in range(6):
+            photo, square = backdrop.copy(), np.s_[20 + height : 40, 4 + 12 * k : 16 + 12 * k]
+            photo[square] = random.integers(0, 256, photo[square].shape)
+            views.append(photo)
+            squares.append(square)
+    for moving, square in zip(moving_pixels(views), squares):
+        inside = np.zeros((60, 80), bool)
+        inside[square] = True
+        assert moving[inside].mean() > 0.95 and moving[~inside].mean() < 0.1
+    assert not np.any(moving_pixels([views[0]] * 4))
 
 
 def random_turns(n: int, seed: int = 0) -> torch.Tensor:

@@ -97,7 +97,12 @@ class Reconstruction:
 
 
 def reconstruct(
-    photos: list[Photograph], images: Path, folder: Path, seed: int, report: Callable[[str, float], None]
+    photos: list[Photograph],
+    images: Path,
+    folder: Path,
+    seed: int,
+    report: Callable[[str, float], None],
+    moving: Path | None = None,
 ) -> Reconstruction:
     """Finds cameras and sparse points.
 
@@ -107,6 +112,8 @@ def reconstruct(
         folder: A working folder; what is found there of an earlier, interrupted call is used.
         seed: The seed of all random choices.
         report: Called with the step's name and the share done.
+        moving: A folder with a mask `GROUP/FILE.png` of each photo, outside of which no features are taken; None: they are
+            taken everywhere.
 
     Raises:
         InputError: Fewer than three photos fit together.
@@ -116,6 +123,8 @@ def reconstruct(
     extraction.max_image_size, extraction.sift.max_num_features = LONGEST, MOST_FEATURES
     reader = pycolmap.ImageReaderOptions()
     reader.camera_model = "OPENCV"
+    if moving is not None:
+        reader.mask_path = moving
     pipeline.random_seed = pipeline.mapper.random_seed = seed
     n = len(photos)
     with _quiet():

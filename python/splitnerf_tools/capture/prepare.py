@@ -33,6 +33,7 @@ from splitnerf_tools.capture.photographs import (
 from splitnerf_tools.capture.photometry import Exposures, find_exposures
 from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
 from splitnerf_tools.capture.surroundings import Shot, surroundings
+from splitnerf_tools.capture.turntable import light_turns, write_moving
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf_tools.capture.world import World, settle
 
@@ -51,12 +52,14 @@ class PrepareSettings:
         masks: A folder with masks of the photos, or None to find them.
         frames: The number of frames that are taken of a video.
         seed: The seed of all random choices.
+        turntable: Whether the object turned before a camera on a stand, and not the camera around the object.
     """
 
     max_size: int = 0
     masks: Path | None = None
     frames: int = 100
     seed: int = 0
+    turntable: bool = False
 
 
 @dataclass
@@ -97,7 +100,10 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         _begin(work, photos, settings)
         kept, left_out = _sorted_out(photos, report)
         images = _upright_copies(kept, work)
-        found = reconstruct(kept, images, work, settings.seed, report)
+        moving = work / "moving" if settings.turntable else None
+        if moving is not None:
+            write_moving(images, moving, lambda share: report("photos", share))
+        found = reconstruct(kept, images, work, settings.seed, report, moving)
         left_out |= _without_camera(kept, found.names, source)
         world = settle(found, settings.seed)
         by_name = {photo.name: photo for photo in kept}
@@ -120,7 +126,7 @@ def _photographs(
 def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> None:
     """Empties the working folder where it holds another set of photos."""
     files = [(p.name, p.path.stat().st_size, p.path.stat().st_mtime_ns) for p in photos]
-    print_of_photos = hashlib.sha256(json.dumps([files, settings.seed]).encode()).hexdigest()
+    print_of_photos = hashlib.sha256(json.dumps([files, settings.seed, settings.turntable]).encode()).hexdigest()
     marker = work / "photos.sha256"
     if work.exists() and (not marker.exists() or marker.read_text() != print_of_photos):
         shutil.rmtree(work)
@@ -176,7 +182,7 @@ def _without_camera(photos: list[Photograph], placed: list[str], source: Path) -
     if len(lost) > FEW_LOST * len(photos):
         note(
             f"{source}: {len(lost)} of {len(photos)} photos do not fit together with the others; take more between them, and leave "
-            "the object where it stands (on a turntable it moves against what is around it, and so does its light)"
+            "the object where it stands, or give --turntable where it turned before the camera"
         )
     return dict.fromkeys(lost, "its camera was not found: too little in common with the others")
 
@@ -221,7 +227,7 @@ def write_data(
         write_png(out / "images" / f"{name}.png", undistort(photo, scene.lenses[i], pinhole))
         report("images", (i + 1) / len(scene.names))
     if mask_of is None:
-        _write_transforms(world, exposures, pinholes, out, masked=False)
+        _write_transforms(world, exposures, pinholes, out, masked=False, turntable=settings.turntable)
         try:
             masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
         except BaseException:
@@ -232,8 +238,9 @@ def write_data(
     for name, pinhole, mask in zip(scene.names, pinholes, masks):
         small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
         write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))
-    _write_transforms(world, exposures, pinholes, out, masked=True)
-    write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
+    _write_transforms(world, exposures, pinholes, out, masked=True, turntable=settings.turntable)
+    if not settings.turntable:  # what is around the object stands elsewhere in each photo
+        write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
     return np.array([mask.mean() for mask in masks])
 
 
@@ -253,9 +260,11 @@ def surroundings_of(world: World, exposures: Exposures, out: Path, settings: Pre
     return surroundings(shots(), centre, world.table_radius)
 
 
-def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], out: Path, *, masked: bool) -> None:
-    """`transforms.json`, with the masks that stand beside it or without."""
-    frames = []
+def _write_transforms(
+    world: World, exposures: Exposures, pinholes: list[Lens], out: Path, *, masked: bool, turntable: bool
+) -> None:
+    """`transforms.json`, with the masks that stand beside it or without, and the light's rotations on a turntable."""
+    frames, turns = [], light_turns(world.scene.poses)
     for i, (name, pinhole) in enumerate(zip(world.scene.names, pinholes)):
         mask = {"mask_path": f"masks/{name}.png"} if masked else {}
         frames.append(
@@ -270,6 +279,7 @@ def _write_transforms(world: World, exposures: Exposures, pinholes: list[Lens], 
                 "cy": pinhole.cy,
                 "exposure": float(exposures.gains[i]),
                 "transform_matrix": world.scene.poses[i].tolist(),
+                **({"light_rotation": turns[i].tolist()} if turntable else {}),
             }
         )
     content = {"camera_model": "PINHOLE", "mask_kind": "object", "frames": frames}

@@ -29,7 +29,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "prepare",
         help="find cameras, masks and exposures of photographs",
-        description="Reads a folder of photographs, or a video, of one object that does not move, and writes DATA, which train "
+        description="Reads a folder of photographs, or a video, of one object that does not move, or turns on a turntable, and writes DATA, which train "
         "reads: images without lens distortion, masks, transforms.json, and prepare.html to look at. The same command continues "
         "where it was interrupted.",
         epilog=examples(
@@ -49,6 +49,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="longest edge of the written images in pixels (default: the photos')",
     )
     parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
+    parser.add_argument(
+        "--turntable",
+        action="store_true",
+        help="the object turned before a camera on a stand, which may be moved up and down: features are taken of what "
+        "moves, and each photo gets the rotation of its light",
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
     parser.set_defaults(execute=run)
 
@@ -61,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
     from splitnerf_tools.capture.prepare import PrepareSettings, prepare
 
-    settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed)
+    settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed, args.turntable)
     with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM
 
         def report(step: str, share: float) -> None:
