@@ -152,9 +152,10 @@ def reconstruct(
         )
         model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
         if model is None or model.num_reg_images() < MIN_PHOTOS:
+            otherwise = "" if moving is not None else ", or give --turntable where it turned before the camera"
             raise InputError(
                 f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
-                "the next, of an object that does not move on a table with a pattern"
+                f"the next, of an object that does not move on a table with a pattern{otherwise}"
             )
         model = _adjusted(model)
     return _taken_out(model, len(models))
