@@ -202,6 +202,7 @@ def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
         (["RUN", "--lights", "low"], "--lights needs --data"),
         (["RUN", "RUN", "--data", "d", "--data", "d", "--data", "d"], "--data was given 3 times for 2 runs"),
         (["RUN", "RUN", "--data", "d", "--out", "x.json"], "--out takes one run, got 2"),
+        (["RUN", "--data", "d", "--sheet", "x.pdf"], "must end in .png or .jpg"),
         (["RUN", "--data", "d", "--env", "m.hdr"], "a run has its own light; leave --env out"),
         (["RUN/gone.glb", "--data", "d"], "gone.glb: no such file"),
     ],

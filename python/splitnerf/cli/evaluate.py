@@ -8,8 +8,8 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, add_reading_options, examples, print_scores, reading_of
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "views", "lights", "maps", "env", "protocol", "truth")
-OWN_RULES = ("lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol", "truth")
+OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
 SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
 
 
@@ -71,6 +71,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     )
     add("--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched")
     add("--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean")
+    add("--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error")
     parser.set_defaults(execute=run)
 
 
@@ -126,8 +127,11 @@ def check_usage(args: argparse.Namespace) -> None:
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
         )
-    if args.out is not None and len(args.targets) > 1:
-        raise InputError(f"--out takes one run, got {len(args.targets)}; evaluate them one by one")
+    for name in ("out", "sheet"):
+        if getattr(args, name) is not None and len(args.targets) > 1:
+            raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
+    if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
+        raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
     holds = holds_published if args.protocol else holds_evaluation
     for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
@@ -148,6 +152,11 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
         raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
     else:
         evaluated = evaluate_run(target, data, protocol, args.out)
+    if args.sheet:
+        from splitnerf.evaluate.sheet import write_sheet
+
+        write_sheet(args.sheet, evaluated)
+        print(f"sheet: {args.sheet}")
     return evaluated.scores
 
 

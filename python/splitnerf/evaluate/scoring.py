@@ -70,12 +70,13 @@ class Protocol:
 
 @dataclass
 class Evaluated:
-    """The contents of evaluation.json, and what they were computed from: the views, their maps and their truths."""
+    """The contents of evaluation.json, and what they were computed from: the views, their maps and truths, relit views."""
 
     scores: dict
     dataset: Dataset
     predictions: list[dict[str, np.ndarray]]
     truths: list[ViewTruth]
+    relit: RelitViews | None
 
 
 @dataclass
@@ -205,7 +206,7 @@ def score_asset(
     """
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
-    _, relit = relit_scores(renderer, views, maps, spp)
+    relit = relit_scores(renderer, views, maps, spp)
     evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "asset", "spp": spp})
 
@@ -225,7 +226,7 @@ def score_fields(
     data's world frame (None: that of the asset), and what was exported, which the relit views show, or None."""
     predictions = [render_maps(model, grid, views, i) for i in tracked(range(len(views)), "evaluation, view")]
     light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
-    relit = None if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)[1]
+    relit = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
     evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "fields"})
@@ -236,11 +237,11 @@ def _scored(
     views: Dataset,
     light: np.ndarray | None,
     mesh: trimesh.Trimesh | None,
-    relit: dict | None,
+    relit: tuple[RelitViews | None, dict | None],
     seconds: float | None,
     free_exposure: bool,
 ) -> Evaluated:
-    """Scores rendered views, a light and a mesh against the truth of the data."""
+    """Scores rendered views, a light and a mesh against the truth of the data; relit views bring their scores."""
     if free_exposure and light is not None:
         views = exposed_like(views, predictions)
     truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
@@ -253,10 +254,11 @@ def _scored(
         mesh,
         truth.mesh,
         seconds,
-        relight=relit,
+        relight=relit[1],
         distance=find_distance()[0],
     )
-    return Evaluated(scores | ({"exposures": "fitted"} if free_exposure else {}), views, predictions, truths)
+    scores |= {"exposures": "fitted"} if free_exposure else {}
+    return Evaluated(scores, views, predictions, truths, relit[0])
 
 
 def asset_predictions(
