@@ -211,7 +211,7 @@ def test_a_run_of_a_turntable_goes_to_its_end(data, tmp_path, capsys):
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["novel_view"]["psnr"] > 8
     model, _, content = load_run(run)
-    assert len(content["light_turns"]) == 6 and len(model.occlusion.turns) == 6
+    assert len(content["light_turns"]) == 6 and len(model.cells.turns) == 6
     assert model.config.shading.method == "split"
     assert main(["evaluate", str(run), "--data", str(turned), "--spp", "1"]) == DONE
     mlp = [*words, "--set", "occlusion.kind=mlp", "--set", "shading.method=split", "--overwrite"]
