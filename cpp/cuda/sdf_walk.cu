@@ -108,7 +108,7 @@ void sdf_values(const Queue& queue, const SdfField<T>& field, int64_t n, const T
 template <class T>
 void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOptions& march, const OccupancyView& cells,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
+                 int64_t capacity, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
                  const SampleAllocator<T>& allocate) {
   const char* op = "sample_rays";
   const SdfLayer<T> layer = prepare(queue, op, field.weights);
@@ -128,11 +128,11 @@ void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOption
     });
   }
   sum_counts(queue, op, n_rays, all);
-  const int64_t rows = room > 0 ? room : read_number(queue, all + n_rays);
+  const int64_t rows = capacity > 0 ? capacity : read_number(queue, all + n_rays);
   for_each(queue, op, n_rays + 1, FitOffsetsBody{n_rays, rows, all, offsets, n_found});
   const PackedSamples<T> to = allocate(rows);
   for_each_group(queue, op, n_rays, PackSamplesBody<T>{most, T(march.step), starts, offsets, to});
-  if (room > 0) for_each(queue, op, room, PadSamplesBody<T>{offsets + n_rays, to});
+  if (capacity > 0) for_each(queue, op, capacity, PadSamplesBody<T>{offsets + n_rays, to});
 }
 
 #define SPLITNERF_INSTANTIATE(T)                                                                                \

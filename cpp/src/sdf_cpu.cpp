@@ -27,7 +27,7 @@ template <class T> void sdf_values(const SdfField<T>& field, int64_t n, const T*
 template <class T>
 void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
+                 int64_t capacity, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
                  const SampleAllocator<T>& allocate) {
   const Kernels<T>& k = kernels<T>();
   const PreparedField<T> prepared(field);
@@ -54,7 +54,7 @@ void sample_rays(const SdfField<T>& field, const MarchOptions& march, const Occu
   });
   std::vector<int64_t> all(n_rays + 1);
   for (int64_t r = 0; r < n_rays; ++r) all[r + 1] = all[r] + static_cast<int64_t>(kept[r].size());
-  const int64_t rows = room > 0 ? room : all[n_rays];
+  const int64_t rows = capacity > 0 ? capacity : all[n_rays];
   const FitOffsetsBody fit{n_rays, rows, all.data(), offsets, n_found};
   for (int64_t r = 0; r <= n_rays; ++r) fit(r);
   const PackedSamples<T> to = allocate(rows);

@@ -198,7 +198,7 @@ Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, 
   require(per_ray >= 0 && per_ray < 1 << 20, op, "per_ray must be in [0, 2^20)");
   const bool fixed = max_shaded >= 0;
   require(fixed == (max_stretches >= 0), op, "max_shaded and max_stretches must be given both or neither");
-  const SpreadSizes room{max_shaded, u.size(0), max_stretches};
+  const SpreadSizes capacity{max_shaded, u.size(0), max_stretches};
   const auto indices = [&](int64_t n) { return empty_like_type(w, {n}, ScalarType::Long); };
   Tensor first = indices(w.size(0)), second = indices(w.size(0)), share = empty_like_type(w, {w.size(0)}, type);
   Tensor shaded, heaviest, leaders, stretch, sizes = indices(3);
@@ -208,7 +208,7 @@ Tensors8 spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, 
                                     return Spread{out<int64_t>(shaded), out<int64_t>(heaviest), out<int64_t>(leaders),
                                                   out<int64_t>(stretch), n};
                                   },
-                                  fixed ? &room : nullptr};
+                                  fixed ? &capacity : nullptr};
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
     const auto inside = [](T p) { return p >= T(0) && p < T(1); };

@@ -136,7 +136,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
     Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, Tensor table, Tensor hidden, Tensor hidden_bias,
     Tensor out_weights, Tensor out_bias, double beta, int64_t n_levels, int64_t base_resolution, double growth,
     int64_t log2_table_size, int64_t n_active, double box, double step, int64_t max_samples, double s, double anneal,
-    double min_weight, double min_transmittance, double reach, double lipschitz, int64_t room) {
+    double min_weight, double min_transmittance, double reach, double lipschitz, int64_t capacity) {
   const char* op = "sample_rays";
   const Field field(op, table, hidden, hidden_bias, out_weights, out_bias, beta, n_levels, base_resolution, growth,
                     log2_table_size, n_active, box);
@@ -151,7 +151,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
   require(step > 0 && s > 0 && lipschitz > 0, op, "step, s and lipschitz must be positive");
   require(min_transmittance >= 0 && min_transmittance < 1 && min_weight >= 0 && min_weight < 1, op,
           "min_weight and min_transmittance must be in [0, 1)");
-  require(room >= 0, op, "room must not be negative");
+  require(capacity >= 0, op, "capacity must not be negative");
   require(reach >= 0 && anneal >= 0 && anneal <= 1, op, "reach must not be negative, anneal must be in [0, 1]");
   const MarchOptions march{static_cast<float>(box), static_cast<float>(step), max_samples};
   const int64_t n_blocks = blocks_along(static_cast<int>(resolution));
@@ -172,7 +172,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
     };
     device.run(op, blocks.numel(),
                OccupiedBlocksBody{occupancy.cells, occupancy.resolution, occupancy.n_blocks, out<uint8_t>(blocks)});
-    device.sample_rays(field.view<T>(), march, occupancy, rules, n_rays, in<T>(o), in<T>(d), in<T>(u), room,
+    device.sample_rays(field.view<T>(), march, occupancy, rules, n_rays, in<T>(o), in<T>(d), in<T>(u), capacity,
                        out<int64_t>(offsets), out<int64_t>(evaluated), out<int64_t>(found), allocate);
   });
   return {ray_indices, t_starts, t_ends, offsets, evaluated, found};
@@ -195,7 +195,7 @@ STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
   m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
   m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK
         ", float step, int max_samples, float s, float anneal, float min_weight, float min_transmittance, "
-        "float reach, float lipschitz, int room) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
+        "float reach, float lipschitz, int capacity) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
 }
 
 SPLITNERF_IMPLEMENT(m) {

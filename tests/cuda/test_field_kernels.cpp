@@ -239,14 +239,15 @@ template <class T> struct Found {
   }
 };
 // What the CPU finds, and the GPU.
-template <class T> std::pair<Found<T>, Found<T>> find(const SdfField<T>& field, const Rays<T>& r, int64_t room = 0) {
+template <class T>
+std::pair<Found<T>, Found<T>> find(const SdfField<T>& field, const Rays<T>& r, int64_t capacity = 0) {
   const OccupancyCells cells(r.cells.data(), 6);
   Found<T> a(r.n), b(r.n);
   Gpu gpu;
-  cpu::sample_rays<T>(field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(), room,
+  cpu::sample_rays<T>(field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(), capacity,
                       a.offsets.data(), a.evaluated.data(), &a.all, a.allocate());
   cuda::sample_rays<T>(gpu.queue(), field, r.march, cells.view(), r.rules, r.n, r.o.data(), r.d.data(), r.jitter.data(),
-                       room, b.offsets.data(), b.evaluated.data(), &b.all, b.allocate());
+                       capacity, b.offsets.data(), b.evaluated.data(), &b.all, b.allocate());
   return {a, b};
 }
 void expect_same_samples(const std::pair<Found<double>, Found<double>>& found) {
@@ -271,17 +272,17 @@ TEST(FieldKernels, SampledRays) {
   }
 }
 
-// With room for fewer and for more samples than there are, and for none of an empty box.
+// With capacity for fewer and for more samples than there are, and for none of an empty box.
 TEST(FieldKernels, SampledRaysWithRoom) {
   Random random(4);
   const Field field(random);
   Rays<double> rays(random, 30);
   const int64_t n = find(field.view(), rays).first.all;
-  for (const int64_t room : {int64_t(1), n - 3, n + 300}) {
-    const auto found = find(field.view(), rays, room);
+  for (const int64_t capacity : {int64_t(1), n - 3, n + 300}) {
+    const auto found = find(field.view(), rays, capacity);
     expect_same_samples(found);
     EXPECT_EQ(found.second.all, n);
-    EXPECT_EQ(int64_t(found.second.starts.size()), room);
+    EXPECT_EQ(int64_t(found.second.starts.size()), capacity);
   }
   std::fill(rays.cells.begin(), rays.cells.end(), uint8_t(Cell::kEmpty));
   const auto found = find(field.view(), rays, 5);

@@ -113,7 +113,7 @@ TEST(GroupKernels, CompositeAndItsGradients) {
   }
 }
 
-// With as much room as is needed, with more, and with too little.
+// With as much capacity as is needed, with more, and with too little.
 TEST(GroupKernels, SpreadSamples) {
   const Rays r;
   const int64_t n = r.n(), n_rays = r.packed().n_rays;
@@ -121,14 +121,14 @@ TEST(GroupKernels, SpreadSamples) {
   const auto w = random.uniforms(size_t(n)), phase = random.uniforms(size_t(n_rays));
   std::vector<double> t(n);
   for (int64_t i = 0; i < n; ++i) t[i] = (i ? t[i - 1] : 0) + random.uniform(0.01, 0.2);
-  const SpreadSizes room{500, n_rays, 400}, narrow{20, n_rays, 10};
+  const SpreadSizes capacity{500, n_rays, 400}, narrow{20, n_rays, 10};
   const double unit = 0.5;
   for (const auto& [per_ray, gap, fixed] :
        std::initializer_list<std::tuple<int, double, const SpreadSizes*>>{{0, 0.15, nullptr},
                                                                           {1, 0.15, nullptr},
                                                                           {4, INFINITY, nullptr},
-                                                                          {4, 0.15, &room},
-                                                                          {1, INFINITY, &room},
+                                                                          {4, 0.15, &capacity},
+                                                                          {1, INFINITY, &capacity},
                                                                           {4, 0.15, &narrow}}) {
     using Indices = std::vector<int64_t>;
     struct Result {
@@ -324,7 +324,7 @@ TEST(GroupKernels, SummedLightAndItsGradients) {
     for (const bool with_sent : {false, true}) check_summed_light(n, 35, with_sent);
 }
 TEST(GroupKernels, SummedLightOfMorePointsThanWarps) { check_summed_light(2133, 3, false); }
-// Only four warps have room for their copies; then none has.
+// Only four warps have space for their copies; then none has.
 TEST(GroupKernels, SummedLightOfManyDirections) {
   check_summed_light(9, 1300, true);
   std::vector<double> to_light(3 * 10000);

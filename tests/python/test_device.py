@@ -69,7 +69,7 @@ WAITS = {
 
 @pytest.mark.parametrize("name", ["cpu", "fast", "paper"])
 def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, monkeypatch, name):
-    """Operators that must know how many samples there are wait within, unless they are told what to have room for."""
+    """Operators that must know how many samples there are wait within, unless they are told their capacity."""
     seen, advance, poll = {}, trainer.Training.advance, SurfaceMesh.poll
 
     def waiting(module, name, is_told):
@@ -82,7 +82,7 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
         monkeypatch.setattr(module, name, called)
 
     waiting(renderer, "march_rays", lambda *_: False)
-    waiting(renderer, "sample_rays", lambda *_, room, **__: room > 0)
+    waiting(renderer, "sample_rays", lambda *_, capacity, **__: capacity > 0)
     waiting(renderer, "spread_samples", lambda *args: args[5] is not None)
     waiting(model, "wide_lobes", lambda *args: args[4] is not None)
 
@@ -95,7 +95,7 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
     monkeypatch.setattr(occupancy, "ALL_CELLS_UNTIL", 20)
     monkeypatch.setattr(trainer.Training, "advance", watched)
     monkeypatch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # takes its mesh at once
-    settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples have room
+    settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples fit
     config = tiny(
         name,
         steps=250,

@@ -86,7 +86,7 @@ class Fake(GpuStep):
         is_new = any(all(graph is not other for other in known) for graph in self._graphs.values())
         how = "recorded" if is_new else "called" if len(self.calls) > before else "repeated"
         complete = self.counted(*counts) if counts else None
-        return SimpleNamespace(value=result[0].item(), how=how, room=self.calls[-1], complete=complete)
+        return SimpleNamespace(value=result[0].item(), how=how, capacity=self.calls[-1], complete=complete)
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ def ways(taker: Fake, n: int, **settings) -> list[str]:
 
 
 def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch):
-    """The first has room for all there is; the first with a room is called too, so that its kernels are loaded."""
+    """The first fits all there is; the first with a capacity is called too, so that its kernels are loaded."""
     assert step.sample_capacity == PADDED
     replays, replay = [], pretend_graphs.PretendGraph.replay
     monkeypatch.setattr(pretend_graphs.PretendGraph, "replay", lambda self: replays.append(self) or replay(self))
@@ -181,15 +181,15 @@ def test_a_graph_with_too_little_room_is_recorded_anew_before_it_fails(step):
     for counts in ((1163.0, 100.0), (100.0, 465.0), COUNTS):
         assert step.taken(counts=counts).complete
     assert ways(step, 1) == ["repeated"]
-    for counts, room in (((1164.0, 100.0), (1536, 256)), ((100.0, 466.0), (256, 768))):
+    for counts, capacity in (((1164.0, 100.0), (1536, 256)), ((100.0, 466.0), (256, 768))):
         assert step.taken(counts=counts).how == "repeated"
-        assert step.taken().how == "recorded" and step.calls[-1] == room
+        assert step.taken().how == "recorded" and step.calls[-1] == capacity
         ways(step, 1, counts=COUNTS)
 
 
 @pytest.mark.parametrize("counts", [(1281.0, 512.0), (1280.0, 513.0)])
 def test_what_exceeds_its_room_is_not_complete_and_one_graph_is_recorded_anew(step, counts):
-    """With more room: that of the key, although no other is left. Others stay as they are."""
+    """With more capacity: that of the key, although no other is left. Others stay as they are."""
     assert step.taken(counts=(1e9, 1e9)).complete  # the first step has no limit
     step.counted(*COUNTS)
     ways(step, 2)

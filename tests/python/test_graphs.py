@@ -153,7 +153,7 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     assert (
         not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3
     )  # none goes to and fro
-    # A kind of steps is called, then recorded, and recorded anew where the graph has too little room.
+    # A kind of steps is called, then recorded, and recorded anew where the graph has too little capacity.
     assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
     assert [step.how for step in steps].count("replayed") > 70
 
@@ -165,7 +165,7 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
 
 
 def test_a_capacity_changes_roundings_alone(data):
-    """Losses and gradients of one step with room for more of everything, against those with none."""
+    """Losses and gradients of one step with capacity for more of everything, against those with none."""
     dataset = load_dataset(data)
     config = tiny(
         "cpu",

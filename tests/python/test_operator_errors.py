@@ -85,7 +85,7 @@ ERRORS = [
     ("light_lookup", 5, without, "nodes must be [4] float64"),
     ("sample_rays", 7, lambda out: out[:, :3], "out must be [n, 32]"),
     ("sample_rays", 16, lambda step: 0.0, "step"),
-    ("sample_rays", 24, lambda room: -1, "room must not be negative"),
+    ("sample_rays", 24, lambda capacity: -1, "capacity must not be negative"),
     ("draw_rays", 1, lambda n: 301, "n_near must be from 0 to the number of rays"),
     ("draw_rays", 4, lambda count: 0, "near has runs without pixels"),
     ("draw_rays", 7, lambda count: 0, "known has no pixels"),

@@ -108,11 +108,11 @@ def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
 def test_too_little_room_is_told_and_indices_stay_in_range():
     weights, samples, phase = packed_samples()
     n_shaded, _, n_stretches = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
-    for room in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
-        spread = spread_samples(weights, samples, 2, phase, 0.3, capacity=room)
+    for capacity in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
+        spread = spread_samples(weights, samples, 2, phase, 0.3, capacity=capacity)
         assert spread.sizes.tolist() == [n_shaded, 49, n_stretches]
-        assert spread.interpolate(weights.new_ones(room[0], 1)).eq(1).all() and spread.stretch.max() < room[1]
-        assert max(spread.leaders.max(), spread.heaviest.max()) < room[0] and spread.shaded.max() < len(weights)
+        assert spread.interpolate(weights.new_ones(capacity[0], 1)).eq(1).all() and spread.stretch.max() < capacity[1]
+        assert max(spread.leaders.max(), spread.heaviest.max()) < capacity[0] and spread.shaded.max() < len(weights)
     check_error(
         lambda: lib.spread_samples(weights, samples.middles, samples.offsets, phase, 0.3, 2, 5), "max_stretches"
     )

@@ -183,19 +183,19 @@ def test_empty_cells_are_not_asked():
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_a_room_cuts_the_samples_or_is_filled_up(dtype):
-    """Cut samples are those of the last rays, and no offset points behind the room."""
+    """Cut samples are those of the last rays, and no offset points behind the capacity."""
     field, rays = bumpy_field().to(dtype), field_rays(30, dtype)
     free, asked, found = sampled(field, rays)
     n = len(free.t_starts)
     assert int(found) == n > 60
-    for room in (1, n - 5, n, n + 7, 3 * n + 1):
-        samples, evaluated, found = sampled(field, rays, room=room)
+    for capacity in (1, n - 5, n, n + 7, 3 * n + 1):
+        samples, evaluated, found = sampled(field, rays, capacity=capacity)
         assert int(found) == n and torch.equal(evaluated, asked)
-        assert torch.equal(samples.offsets, free.offsets.clamp(max=room))
+        assert torch.equal(samples.offsets, free.offsets.clamp(max=capacity))
         for ours, all_ in zip(samples[:3], free[:3]):
-            assert torch.equal(ours, torch.nn.functional.pad(all_, (0, 2 * n + 1))[:room])
+            assert torch.equal(ours, torch.nn.functional.pad(all_, (0, 2 * n + 1))[:capacity])
     empty = torch.full_like(full_cells(), CELL_EMPTY)
-    samples, _, found = sampled(field, rays, empty, room=9)
+    samples, _, found = sampled(field, rays, empty, capacity=9)
     assert int(found) == 0 and not samples.offsets.any() and not any(x.any() for x in samples[:3])
     assert all(len(x) == 9 for x in samples[:3])
 

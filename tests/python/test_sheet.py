@@ -12,7 +12,7 @@ from splitnerf.evaluate.sheet import picture_grid, write_sheet
 from test_evaluate import HEIGHT, TILTED, WIDTH, asset_views  # noqa: F401
 
 
-def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, monkeypatch):
+def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, monkeypatch):  # noqa: F811
     """On white by its own coverage, scaled by the headline's factor; normals where the truth is known."""
     shown = {}
 

@@ -73,17 +73,17 @@ SPLITNERF_API void sdf_field_backward(const SdfField<T>& field, int64_t n, const
                                       const SdfOutputs<const T>& given, const SdfFieldGrad<T>& grad);
 
 // Follows each ray through the occupied cells and asks for the distance on the way, see ray_walk.h. offsets [n_rays + 1];
-// n_evaluated [n_rays]: points at which the distance was asked for; allocate(n) makes room for the n samples that are kept.
+// n_evaluated [n_rays]: points at which the distance was asked for; allocate(n) returns arrays for the n samples that are kept.
 template <class T>
 SPLITNERF_API void sample_rays(const SdfField<T>& field, const MarchOptions& march, const OccupancyView& grid,
                                const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d,
-                               const T* jitter, int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
-                               const SampleAllocator<T>& allocate);
+                               const T* jitter, int64_t capacity, int64_t* offsets, int64_t* n_evaluated,
+                               int64_t* n_found, const SampleAllocator<T>& allocate);
 
 // Which samples are shaded, `per_ray` of each ray spread by weight (0: all), and where the others lie between them. What is
 // more than `gap` apart along the ray is drawn for and interpolated on its own.
 // in: weights [n], t [n] along the ray, phase [n_rays] -> sizes [3] of SpreadSizes as counted, first, second, share [n] and what
-// the allocator makes room for, see Spread; where there is more room, entries in range that count for nothing. With too little
+// the allocator provides, see Spread; with more capacity, entries in range that count for nothing. With too little
 // of it sizes tells, and the rest means nothing, but is in range.
 template <class T>
 SPLITNERF_API void spread_samples(const SpreadArrays<T>& in, int64_t* sizes, int64_t* first, int64_t* second, T* share,

@@ -70,7 +70,7 @@ void sdf_field_backward(const Queue& queue, const SdfField<T>& field, int64_t n,
 template <class T>
 void sample_rays(const Queue& queue, const SdfField<T>& field, const MarchOptions& march, const OccupancyView& cells,
                  const SampleRules<T>& rules, int64_t n_rays, const T* rays_o, const T* rays_d, const T* jitter,
-                 int64_t room, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
+                 int64_t capacity, int64_t* offsets, int64_t* n_evaluated, int64_t* n_found,
                  const SampleAllocator<T>& allocate);
 
 }  // namespace splitnerf::cuda

@@ -19,15 +19,15 @@ struct SpreadSizes {
   int64_t shaded, heaviest, leaders;
 };
 struct Spread {
-  int64_t* shaded;    // [shaded] samples, ascending
-  int64_t* heaviest;  // [rays with samples] positions in `shaded`: the largest weight of those
-  int64_t* leaders;   // [stretches] positions in `shaded`: the largest weight of each
-  int64_t* stretch;   // [shaded] the stretch of each
-  SpreadSizes room;   // of these arrays
+  int64_t* shaded;       // [shaded] samples, ascending
+  int64_t* heaviest;     // [rays with samples] positions in `shaded`: the largest weight of those
+  int64_t* leaders;      // [stretches] positions in `shaded`: the largest weight of each
+  int64_t* stretch;      // [shaded] the stretch of each
+  SpreadSizes capacity;  // of these arrays
 
   // Capacity for shaded samples and for segments; the number of rays with samples is at most the number of rays.
   SPLITNERF_HD bool has_room(int64_t n_shaded, int64_t n_stretches) const {
-    return n_shaded <= room.shaded && n_stretches <= room.leaders;
+    return n_shaded <= capacity.shaded && n_stretches <= capacity.leaders;
   }
 };
 

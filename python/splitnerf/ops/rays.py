@@ -297,8 +297,8 @@ def spread_samples(
 
     Source: Systematic resampling (Kitagawa 1996).
     """
-    room = (-1, -1) if capacity is None else capacity
-    found = lib.spread_samples(weights, samples.t_starts, samples.offsets, phase, gap, per_ray, *room, unit)
+    capacity = (-1, -1) if capacity is None else capacity
+    found = lib.spread_samples(weights, samples.t_starts, samples.offsets, phase, gap, per_ray, *capacity, unit)
     return ShadingSubset(*found)
 
 

@@ -365,7 +365,7 @@ def sample_rays(
     reach: float,
     lipschitz: float,
     max_samples: int = 1024,
-    room: int = 0,
+    capacity: int = 0,
 ) -> tuple[PackedSamples, Tensor, Tensor]:
     """The samples of :func:`march_rays` that contribute to a pixel; the search evaluates the distance along the rays.
 
@@ -390,8 +390,8 @@ def sample_rays(
         reach: The distance outside the surface beyond which the density vanishes, scene units.
         lipschitz: The bound on the length of the field's gradient.
         max_samples: The largest number of evaluated distances of one ray.
-        room: If positive, the number of samples in the result, so that the host need not wait for a GPU's count. The last
-            rays lose what has no room. Zeros that belong to no ray fill it up.
+        capacity: If positive, the number of samples in the result, so that the host need not wait for a GPU's count. The last
+            rays lose what does not fit. Zeros that belong to no ray fill it up.
 
     Returns:
         The kept samples; [n_rays] int64, the number of distances per ray that the search asked for (on a GPU more are
@@ -411,7 +411,7 @@ def sample_rays(
         min_transmittance,
         reach,
         lipschitz,
-        room,
+        capacity,
     )
     return PackedSamples(*samples), evaluated, found
 

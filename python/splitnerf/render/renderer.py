@@ -185,7 +185,7 @@ def find_samples(
             reach=DENSITY_CUTOFF / s,
             lipschitz=LIPSCHITZ,
             max_samples=MAX_SAMPLES_PER_RAY,
-            room=capacity,
+            capacity=capacity,
         )
     packed = packed.extended(max(0, capacity - len(packed.ray_indices)))
     probes = ProbePoints(rays_o[:0], jitter[:0], rays_o[:0]) if probes is None else probes

@@ -309,7 +309,7 @@ OWN: dict[str, Callable[[], dict[str, object]]] = {
         min_weight=0.0,
         reach=10.0,
         lipschitz=1.25,
-        room=30 * N + 1,
+        capacity=30 * N + 1,
     ),
     "sdf_field": lambda: dict(
         positions=2.7 * (sphere(N) / 6), hidden_length=1 + pattern(5, 1), out_length=1 + pattern(3, 1), stored=None

@@ -235,14 +235,14 @@ template <class T> struct SpreadUnusedBody {
   T* share;
 
   SPLITNERF_HD int64_t count() const {
-    return max_of(max_of(n_samples, to.room.shaded), max_of(to.room.heaviest, to.room.leaders));
+    return max_of(max_of(n_samples, to.capacity.shaded), max_of(to.capacity.heaviest, to.capacity.leaders));
   }
   SPLITNERF_HD void operator()(int64_t i) const {
     if (i >= owned && i < n_samples) first[i] = second[i] = 0, share[i] = T(0);
-    if (i >= counted.shaded && i < to.room.shaded)
-      to.shaded[i] = within(i, n_owned), to.stretch[i] = within(i, to.room.leaders);
-    if (i >= counted.heaviest && i < to.room.heaviest) to.heaviest[i] = within(i, to.room.shaded);
-    if (i >= counted.leaders && i < to.room.leaders) to.leaders[i] = within(i, to.room.shaded);
+    if (i >= counted.shaded && i < to.capacity.shaded)
+      to.shaded[i] = within(i, n_owned), to.stretch[i] = within(i, to.capacity.leaders);
+    if (i >= counted.heaviest && i < to.capacity.heaviest) to.heaviest[i] = within(i, to.capacity.shaded);
+    if (i >= counted.leaders && i < to.capacity.leaders) to.leaders[i] = within(i, to.capacity.shaded);
   }
   SPLITNERF_HD static int64_t within(int64_t i, int64_t n) { return n > 0 ? i % n : 0; }
 };
@@ -282,19 +282,19 @@ template <class T> struct SpreadFillBody {
   }
 };
 
-// The offsets [n_rays + 1] of samples where there is room for `room` of them, from those of all samples, and how many these are.
+// The offsets [n_rays + 1] of samples where at most `capacity` of them fit, from those of all samples, and how many these are.
 struct FitOffsetsBody {
-  int64_t n_rays, room;
+  int64_t n_rays, capacity;
   const int64_t* all;
   int64_t *offsets, *n_found;
 
   SPLITNERF_HD void operator()(int64_t r) const {
-    offsets[r] = min_of(all[r], room);
+    offsets[r] = min_of(all[r], capacity);
     if (r == n_rays) *n_found = all[r];
   }
 };
 
-// Zeros behind the samples, of which there are `*n`; one call per row of their room.
+// Zeros behind the samples, of which there are `*n`; one call per row of their capacity.
 template <class T> struct PadSamplesBody {
   const int64_t* n;
   PackedSamples<T> to;

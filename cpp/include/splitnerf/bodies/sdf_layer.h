@@ -79,7 +79,7 @@ SPLITNERF_HD int64_t occupied_from(const Group& group, const RayLattice<T>& latt
 // Follows a ray through the field to its end; all threads of the group call keep(t_start) for each kept sample. Returns the
 // number of distances that the walk asked for. The group works out the next samples in occupied cells together, and then all
 // of its threads take the same walk over them with advance(), which the CPU calls as well; where the walk leaps over some of
-// them, they were worked out in vain. tile: room for Group::size / kWalkLanes points.
+// them, they were worked out in vain. tile: space for Group::size / kWalkLanes points.
 template <int F, class T, class S, class Group, class Keep>
 SPLITNERF_HD int64_t walk_ray(const Group& group, const HashGridView<T, S>& grid, const SdfLayer<T>& layer,
                               const SdfTile<T>& tile, const RayLattice<T>& lattice, const OccupancyView& cells,
