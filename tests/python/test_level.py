@@ -7,9 +7,9 @@ import torch
 from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light
 
 
-def texture_values(albedo: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
-    """[m, 8] values of albedo [m] and metallic [m], with a roughness of 0.3."""
-    roughness, normal = torch.full((len(albedo), 1), 0.3), torch.tensor([[0, 0, 1.0]]).expand(len(albedo), -1)
+def texture_values(albedo: torch.Tensor, metallic: torch.Tensor, rough: float = 0.3) -> torch.Tensor:
+    """[m, 8] values of albedo [m] and metallic [m]."""
+    roughness, normal = torch.full((len(albedo), 1), rough), torch.tensor([[0, 0, 1.0]]).expand(len(albedo), -1)
     return torch.cat([albedo[:, None].expand(-1, 3), roughness, metallic[:, None], normal], dim=1)
 
 
@@ -38,6 +38,15 @@ def test_the_level_of_true_dielectrics_and_of_metals_alone_stays():
     assert level_of_light(torch.cat([dielectrics, METAL])) == 1.0
     assert level_of_light(METAL) == 1.0
     assert level_of_light(torch.cat([faint_metals(1.9)[:4], METAL])) == 1.0  # too few to tell
+
+
+def test_rough_surfaces_tell_nothing_and_keep_their_metallic():
+    """Clay that training took for a rough dark metal: what its lobe reflects is what clay scatters."""
+    clay = texture_values(torch.full((90,), 0.18), torch.full((90,), 0.95), rough=0.6)
+    assert level_of_light(torch.cat([clay, METAL])) == 1.0
+    moved = at_level(clay, 1.5)
+    torch.testing.assert_close(moved[:, :3], clay[:, :3] / 1.5)
+    assert torch.equal(moved[:, 3:], clay[:, 3:])
 
 
 def test_surfaces_look_the_same_at_another_level():

@@ -2,7 +2,8 @@
 
 Photos fix the products of light and reflectance. Under a light that is too dark by a factor, each dielectric reflects more
 than the DIELECTRIC share that it must at normal incidence: training makes it a faint or a dark metal. No metal is that
-dark (Lagarde 2011: from about 0.4), so the usual reflectance of what is no metal tells the factor.
+dark (Lagarde 2011: from about 0.4), so the usual reflectance of what is no metal tells the factor. Only glossy surfaces tell it: the lobe of a rough metal looks
+like what clay scatters.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from torch import Tensor
 
 DIELECTRIC = 0.04  # F0, reflectance at normal incidence
 DARKEST_METAL = 0.2  # F0 below which a texel is a dielectric, whatever its metallic says
-LEAST_SHARE = 0.1  # of the texels that must be dielectrics
+GLOSSY = 0.4  # roughness below which F0 is told from what is scattered
+LEAST_SHARE = 0.1  # of the texels that must be glossy dielectrics
 LEAST_FACTOR = 1.05  # below which the level stays
 
 
@@ -22,8 +24,7 @@ def level_of_light(values: Tensor) -> float:
     Args:
         values: [m, 8] texture values: albedo (3), roughness, metallic, normal (3).
     """
-    reflectance = _reflectance(values)
-    dielectrics = reflectance[reflectance < DARKEST_METAL]
+    dielectrics = _reflectance(values)[_dielectric(values)]
     if len(dielectrics) < LEAST_SHARE * len(values):
         return 1.0
     factor = float(dielectrics.median()) / DIELECTRIC
@@ -33,10 +34,10 @@ def level_of_light(values: Tensor) -> float:
 def at_level(values: Tensor, factor: float) -> Tensor:
     """The texture values [m, 8] that look the same under a light brighter by a factor.
 
-    Metals and what is scattered become darker; what reflects less than a metal becomes a dielectric.
+    All become darker; what is glossy and reflects less than a metal becomes a dielectric.
     """
     albedo, metallic = values[:, :3], values[:, 4:5]
-    dielectric = _reflectance(values)[:, None] < DARKEST_METAL
+    dielectric = _dielectric(values)[:, None]
     scattered = torch.where(dielectric, albedo * (1 - metallic), albedo) / factor
     metallic = torch.where(dielectric, 0.0, metallic)
     return torch.cat([scattered, values[:, 3:4], metallic, values[:, 5:]], dim=1)
@@ -46,3 +47,8 @@ def _reflectance(values: Tensor) -> Tensor:
     """[m] F0, mean over the colours."""
     albedo, metallic = values[:, :3], values[:, 4:5]
     return (DIELECTRIC * (1 - metallic) + albedo * metallic).mean(1)
+
+
+def _dielectric(values: Tensor) -> Tensor:
+    """[m] bool, what is glossy and reflects too little for a metal."""
+    return (_reflectance(values) < DARKEST_METAL) & (values[:, 3] < GLOSSY)
