@@ -287,8 +287,11 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
-@pytest.mark.parametrize("turntable", [False, True], ids=["around", "turntable"])
-@pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("given", "turntable"),
+    [(True, False), (True, True), pytest.param(False, False, marks=pytest.mark.slow)],
+    ids=["around", "turntable", "masks to find"],
+)
 def test_photos_to_data(tmp_path, capsys, given, turntable):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""
     n = 12 if given else 20
