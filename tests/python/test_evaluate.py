@@ -246,8 +246,7 @@ class Answers:
         }
 
 
-@pytest.fixture
-def asset_views(tmp_path) -> Dataset:
+def write_asset_views(tmp_path: Path) -> Dataset:
     """Three test views of their own poses and lenses, in a frame half as large as the world, each under two lights."""
     paths = [tmp_path / f"test/r_{i}.png" for i in range(3)]
     images = np.full((3, HEIGHT, WIDTH, 4), 0.5, np.float32)
@@ -263,6 +262,11 @@ def asset_views(tmp_path) -> Dataset:
     return Dataset(
         "toy", tmp_path, "test", 1, images, poses, lenses, [p.stem for p in paths], paths, np.diag([0.5, 0.5, 0.5, 1.0])
     )
+
+
+@pytest.fixture
+def asset_views(tmp_path) -> Dataset:
+    return write_asset_views(tmp_path)
 
 
 def maps_of(asset_views: Dataset) -> dict[str, Path]:

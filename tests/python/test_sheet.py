@@ -9,10 +9,10 @@ from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import sheet
 from splitnerf.evaluate.scoring import Evaluated, RelitViews
 from splitnerf.evaluate.sheet import picture_grid, write_sheet
-from test_evaluate import HEIGHT, TILTED, WIDTH, asset_views  # noqa: F401
+from test_evaluate import HEIGHT, TILTED, WIDTH, write_asset_views
 
 
-def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, monkeypatch):  # noqa: F811
+def test_the_sheet_shows_each_quantity_as_it_is_scored(tmp_path, monkeypatch):
     """On white by its own coverage, scaled by the headline's factor; normals where the truth is known."""
     shown = {}
 
@@ -21,7 +21,7 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, monkeypatch)
         return picture_grid(heads, rows)
 
     monkeypatch.setattr(sheet, "picture_grid", noted)
-    data = asset_views.select([0, 1, 2, 0, 1])
+    data = write_asset_views(tmp_path).select([0, 1, 2, 0, 1])
     grey = np.full((HEIGHT, WIDTH), 0.25, np.float32)
     colour = np.repeat(grey[..., None], 3, axis=-1)
     normal = np.broadcast_to(TILTED, (HEIGHT, WIDTH, 3))
@@ -40,7 +40,7 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, monkeypatch)
     images = [np.full((HEIGHT, WIDTH, 4), 51 * i, np.uint8) for i in range(5)]
     evaluation = {"relight": {"lsq": {"scale": [2.0] * 3}}, "albedo": {"lsq": {"scale": [0.5, 1.0, 2.0]}}}
     relit = RelitViews({"day": images}, data, 1)
-    write_sheet(asset_views.root / "s.png", Evaluated(evaluation, data, [prediction] * 5, truths, relit))
+    write_sheet(tmp_path / "s.png", Evaluated(evaluation, data, [prediction] * 5, truths, relit))
     rows = shown["rows"]
     assert list(rows) == ["novel view", "relit by\nday", "albedo", "roughness", "metallic", "normal"]
     assert [head.split(":")[0] for head in shown["heads"]] == ["r_0"] * 3 + ["r_2"] * 3 + ["r_1"] * 3

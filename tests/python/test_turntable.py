@@ -24,7 +24,7 @@ from splitnerf.fields.light import mean_over
 from splitnerf.pipeline import load_run
 from splitnerf.refinement.fit import FitSettings, Refinement, groups_of
 from splitnerf.render.renderer import render_view
-from splitnerf_tools.capture.turntable import light_turns, moving_pixels
+from splitnerf_tools.capture.turntable import light_turns, moving_pixels, reduced, write_moving
 from splitnerf_tools.synth.rendering import turn_to
 from test_views import LENS, POSE, SIZE, ball
 from tiny_runs import SMALL, as_options
@@ -59,11 +59,21 @@ def test_what_turns_before_a_backdrop_is_found():
             photo[square] = random.integers(0, 256, photo[square].shape)
             views.append(photo)
             squares.append(square)
+    views = [reduced(photo) for photo in views]
     for moving, square in zip(moving_pixels(views), squares):
         inside = np.zeros((60, 80), bool)
         inside[square] = True
         assert moving[inside].mean() > 0.95 and moving[~inside].mean() < 0.1
     assert not np.any(moving_pixels([views[0]] * 4))
+    assert np.all(moving_pixels(views[:2], ["one lens", "another"]))
+
+
+def test_photos_in_which_nothing_turns_are_refused(tmp_path):
+    for i in range(3):
+        write_image(tmp_path / f"lens_1/{i}.png", np.full((30, 40, 3), 0.5))
+    with pytest.raises(InputError, match="nothing turns; leave --turntable out"):
+        write_moving(tmp_path / "lens_1", tmp_path / "moving", lambda share: None)
+    assert not (tmp_path / "moving").exists()
 
 
 def random_turns(n: int, seed: int = 0) -> torch.Tensor:

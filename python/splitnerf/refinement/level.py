@@ -2,8 +2,8 @@
 
 Photos fix the products of light and reflectance. Under a light that is too dark by a factor, each dielectric reflects more
 than the DIELECTRIC share that it must at normal incidence: training makes it a faint or a dark metal. No metal is that
-dark (Lagarde 2011: from about 0.4), so the usual reflectance of what is no metal tells the factor. Only glossy surfaces tell it: the lobe of a rough metal looks
-like what clay scatters.
+dark (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2), so the usual reflectance of what is no metal tells
+the factor. Only glossy surfaces tell it: the lobe of a rough metal looks like what clay scatters.
 """
 
 from __future__ import annotations

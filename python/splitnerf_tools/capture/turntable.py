@@ -21,31 +21,28 @@ STEEP = 0.3  # horizontal part of the axis of a camera below which its upward ax
 GROWN = 2  # pixels by which what moves is made wider, for features at its outline
 
 
-def moving_pixels(photos: Sequence[np.ndarray], of: Sequence[int] | None = None) -> list[np.ndarray]:
-    """[h, w] bool of each photo, at most EDGE pixels large: what does not look as it does in many others of its size.
+def moving_pixels(photos: Sequence[np.ndarray], of: Sequence[object] | None = None) -> list[np.ndarray]:
+    """[h, w] bool of each photo: what does not look as it does in many others of its size.
 
     Args:
-        photos: [H, W, 3] uint8 or uint16, of any sizes.
-        of: A number of each photo; only photos of one number are compared. None: all.
+        photos: [h, w, 3] int16 values of 8 bits, of any sizes.
+        of: The lens of each photo; only photos of one lens are compared. None: all.
     """
-    small = [_reduced(photo) for photo in photos]
-    kinds = [(photo.shape, 0 if of is None else of[i]) for i, photo in enumerate(photos)]
+    kinds = [(photo.shape, of and of[i]) for i, photo in enumerate(photos)]
     result = []
-    for i, photo in enumerate(small):
-        others = [j for j in range(len(small)) if j != i and kinds[j] == kinds[i]]
-        others = [
-            others[k] for k in np.unique(np.linspace(0, len(others) - 1, min(len(others), MOST_OTHERS)).astype(int))
-        ]
+    for i, photo in enumerate(photos):
+        others = [j for j in range(len(photos)) if j != i and kinds[j] == kinds[i]]
+        chosen = np.unique(np.linspace(0, len(others) - 1, min(len(others), MOST_OTHERS)).astype(int))
         alike = np.zeros(photo.shape[:2], int)
-        for j in others:
-            alike += np.abs(photo - small[j]).max(axis=2) < ALIKE
-        moving = ndimage.binary_opening(alike < max(1.0, STILL * len(others)))
+        for k in chosen:
+            alike += np.abs(photo - photos[others[k]]).max(axis=2) < ALIKE
+        moving = ndimage.binary_opening(alike < max(1.0, STILL * len(chosen)))
         result.append(ndimage.binary_dilation(moving, iterations=GROWN))
     return result
 
 
-def _reduced(photo: np.ndarray) -> np.ndarray:
-    """[h, w, 3] int16 of a photo [H, W, 3], at most EDGE pixels large."""
+def reduced(photo: np.ndarray) -> np.ndarray:
+    """[h, w, 3] int16 values of 8 bits of a photo [H, W, 3] uint8 or uint16, at most EDGE pixels large."""
     scale = min(1.0, EDGE / max(photo.shape))
     size = tuple(max(1, round(edge * scale)) for edge in photo.shape[1::-1])
     small = cv2.resize(photo, size, interpolation=cv2.INTER_AREA)
@@ -59,20 +56,21 @@ def write_moving(images: Path, folder: Path, report: Callable[[float], None]) ->
         InputError: Nothing moves.
     """
     paths = sorted(path for path in images.rglob("*") if path.is_file())
-    photos = []
+    photos, sizes = [], []
     for i, path in enumerate(paths):
-        photos.append(read_upright(path))
+        photo = read_upright(path)
+        photos.append(reduced(photo))
+        sizes.append(photo.shape[1::-1])
         report((i + 1) / len(paths))
-    masks = moving_pixels(photos, [hash(path.parent) for path in paths])
+    masks = moving_pixels(photos, [path.parent for path in paths])
     if np.mean([mask.mean() for mask in masks]) < LEAST_MOVING:
         raise InputError(
             f"{images}: the photos are all alike, so nothing turns; leave --turntable out, or check the photos"
         )
-    for path, photo, mask in zip(paths, photos, masks):
-        whole = cv2.resize(mask.astype(np.uint8), photo.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+    for path, size, mask in zip(paths, sizes, masks):
         target = folder / path.parent.relative_to(images) / f"{path.name}.png"
         target.parent.mkdir(parents=True, exist_ok=True)
-        write_png(target, 255 * whole)
+        write_png(target, 255 * cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST))
 
 
 def light_turns(poses: np.ndarray) -> np.ndarray:
