@@ -155,6 +155,18 @@ def test_each_batch_has_directions_of_its_own(painted):
     assert torch.equal(colours[0], colours[1]) and not torch.equal(colours[0], colours[2])
 
 
+def test_the_level_of_the_light_is_set_before_the_fit(painted):
+    asset, data = painted
+    gloss = np.tile(np.float32([0.3, 1.0]), (SIZE, SIZE, 1))
+    dark_metal = np.full((SIZE, SIZE, 3), 0.04 * 1.9, np.float32)
+    fit = Refinement(
+        data, with_textures(asset, albedo_texture=dark_metal, roughness_metallic_texture=gloss), sky(), FitSettings()
+    )
+    assert fit.level == pytest.approx(1.9, rel=1e-4)
+    torch.testing.assert_close(fit.light.radiance(), 1.9 * torch.from_numpy(sky()), rtol=1e-3, atol=1e-4)
+    assert (to_values(fit.unknowns)[:, 4] == 0).all()
+
+
 def test_texels_know_their_points_on_the_mesh():
     """What a point of a triangle reads of its four texels' points is, inside charts, the point."""
     mesh = trimesh.creation.icosphere(subdivisions=2)

@@ -37,13 +37,16 @@ def about_z(*degrees: float) -> np.ndarray:
 
 def test_the_light_turns_as_the_camera_seems_to():
     """Each camera stands, in the light's frame, at one azimuth: level ones, one that looks down, one that is rolled."""
-    heights = np.radians([0, 30, 60, 89.9, 45])
+    heights = np.radians([0, 30, 60, 90, 45])
     azimuths = np.radians([0, 100, 200, 300, -40])
     back = np.stack([np.cos(azimuths) * np.cos(heights), np.sin(azimuths) * np.cos(heights), np.sin(heights)], axis=1)
     poses = np.stack([look_at(3 * b, np.zeros(3)) for b in back])
+    away = [np.cos(azimuths[3]), np.sin(azimuths[3]), 0]  # what the camera above has at the lower end of its photo
+    poses[3, :3, :3] = np.stack([np.cross([0, 0, 1], away), np.negative(away), [0, 0, 1]], axis=1)
     poses[4, :3, :3] = poses[4, :3, :3] @ about_z(90)[0]  # a phone on its side
     turns = light_turns(poses)
     np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (5, 3, 3)), atol=1e-12)
+    np.testing.assert_allclose(turns[3] @ poses[3, :3, 1], [-1, 0, 0], atol=1e-6)
     seen = np.einsum("nij,nj->ni", turns, back)
     np.testing.assert_allclose(seen, np.stack([np.cos(heights), 0 * heights, np.sin(heights)], axis=1), atol=1e-6)
 
