@@ -9,9 +9,7 @@ import pretend_graphs
 import pytest
 import torch
 from pretend_gpu import pretend_gpu
-from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
-from splitnerf.errors import InputError
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 from splitnerf.training import gpu_step
@@ -228,12 +226,6 @@ def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch,
     assert complete.count(False) > 0 and moved == complete and trained.finished
     stored = load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"]
     assert max(int(moments["step"]) for moments in stored.values()) == complete.count(True)
-
-
-def test_what_cannot_be_recorded_is_refused():
-    for settings in ({"light.kind": "mlp"}, {"occlusion.kind": "mlp"}, {"normals": "finite_difference"}):
-        with pytest.raises(InputError, match="cuda_graphs"):
-            Config().replace({"cuda_graphs": True, "shading.method": "split", **settings})
 
 
 def test_waiting_while_recording_is_refused():

@@ -138,11 +138,3 @@ def test_the_projection_is_orthonormal_on_the_first_degrees():
             totals = sh_projection(n, cells).double().sum(1)
             assert totals[0].item() == pytest.approx(math.sqrt(4 * math.pi), rel=1e-6)
             assert totals[1:].abs().max() < 2e-6
-
-
-def test_a_nan_shows():
-    directions, _, *rest = lookup_inputs(torch.float32)
-    bad = torch.full((1, 3), math.nan)
-    for rho in (0.0, 0.3, 0.45, 0.7):
-        assert light_lookup(bad, torch.full((1, 1), rho), *rest).isnan().all()
-    assert light_lookup(directions[:1], torch.full((1, 1), math.nan), *rest).isnan().all()

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 import torch
 from gltf_builder import triangle
-from splitnerf import ops
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from tiny_runs import command, contents
-from torch.autograd import forward_ad
 
 
 @pytest.fixture
@@ -167,26 +165,6 @@ def test_scores_of_other_types(tmp_path, capsys, content):
     assert "evaluation.json: is not an evaluation" in error
     (tmp_path / "evaluation.json").write_text(json.dumps({"novel_view": None, "f_score": 0.5}))
     assert main(["evaluate", str(tmp_path)]) == DONE
-
-
-# ---- operators ----
-
-
-def test_forward_derivatives_raise():
-    """Torch itself loses the tangent of an operator without one, and says nothing."""
-    x = torch.tensor([0.5])
-    with pytest.raises(RuntimeError, match="linear_to_srgb: no forward derivative .jvp. is defined"):
-        torch.func.jvp(ops.linear_to_srgb, (x,), (torch.ones(1),))
-    with forward_ad.dual_level():
-        dual = forward_ad.make_dual(x, torch.ones(1))
-        for x_and_more in (dual, dual.clone().requires_grad_()):
-            with pytest.raises((RuntimeError, NotImplementedError)):
-                ops.linear_to_srgb(x_and_more)
-        assert torch.equal(ops.linear_to_srgb(x), ops.linear_to_srgb(x.clone()))  # no tangent, nothing lost
-    for op in ("srgb_to_linear", "composite"):
-        arguments = [x] if op == "srgb_to_linear" else [x, x[:, None], torch.tensor([0, 1])]
-        with pytest.raises(RuntimeError, match=f"{op}: no forward derivative"):
-            torch.func.jvp(lambda a: getattr(ops, op)(a, *arguments[1:]), (x,), (torch.ones(1),))
 
 
 # ---- errors that nobody foresaw ----
