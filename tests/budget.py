@@ -3,8 +3,6 @@
 python tests/budget.py        (make budget)
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from pathlib import Path

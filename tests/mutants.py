@@ -6,8 +6,6 @@ A change that no test sees is printed as a diff.
 cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

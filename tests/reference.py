@@ -4,8 +4,6 @@ Tests compare the operators with these functions, and benchmarks time both. Each
 ``torch.ops.splitnerf.NAME``, in float32 or float64, and returns its results, except those that only the backward pass reads.
 """
 
-from __future__ import annotations
-
 import math
 
 import torch
@@ -314,7 +312,7 @@ def spherical_harmonics(w: Tensor, degree: int) -> Tensor:
         if m:
             diagonal *= math.sqrt((2 * m + 1) / (2 * m)) * (math.sqrt(2) if m == 1 else 1)
         before, p = torch.zeros_like(z), torch.full_like(z, diagonal)
-        for l in range(m, degree + 1):  # noqa: E741
+        for l in range(m, degree + 1):
             rows[l, m], rows[l, -m] = p * cosine, p * (sine if m else cosine)
             span = (l + 1 - m) * (l + 1 + m)
             a = math.sqrt((2 * l + 3) * (2 * l + 1) / span)

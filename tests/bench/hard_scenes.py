@@ -14,8 +14,6 @@ Each becomes OUT/NAME.glb with one material and textures. Data sets are rendered
 a tube about a curve, whose radius may shrink to 0 at both ends. Parts may stick into each other.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
@@ -136,7 +134,7 @@ def rings() -> list[Tube]:
 
 def basket() -> list[Tube]:
     """Brass wires and iron hoops on a wooden plate, with a painted ball inside."""
-    bulge = lambda z: 0.44 + 0.20 * np.cos(1.6 * z)  # noqa: E731
+    bulge = lambda z: 0.44 + 0.20 * np.cos(1.6 * z)
 
     def brass(s, t):
         colour = mix((0.62, 0.44, 0.18), (0.86, 0.66, 0.30), noise(s, t, 20, 2, 11))
@@ -165,7 +163,7 @@ def basket() -> list[Tube]:
 
         return through(path, lambda s: path(s) * [1, 1, 0])
 
-    handle = lambda s: np.stack([0.565 * np.cos(np.pi * s), 0 * s, 0.58 + 0.42 * np.sin(np.pi * s)], 1)  # noqa: E731
+    handle = lambda s: np.stack([0.565 * np.cos(np.pi * s), 0 * s, 0.58 + 0.42 * np.sin(np.pi * s)], 1)
     tubes = [Tube(rib(i / 14), wire(0.017), brass, (80, 12), 24) for i in range(14)]
     for z, thick in zip(np.linspace(-0.52, 0.58, 6), (0.016, 0.016, 0.016, 0.016, 0.016, 0.026)):
         around = ring(np.array([0, 0, z]), np.array([0, 0, 1]), float(bulge(z)))

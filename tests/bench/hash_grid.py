@@ -1,7 +1,5 @@
 """The hash grid encoding: throughput forward and backward, beside plain torch and Dr.Jit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -9,8 +9,6 @@ The first and the last row are the files as they are; between them parts come fr
 surface (tests/bench/swap.py). `all true` is the limit by noise and by the data's own renderer.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ method_lobe.png        the lobe of a rough metal, its mirror direction and its m
 method_occlusion.png   occlusion factors on a plane below a ball, and the closed form
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

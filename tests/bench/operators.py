@@ -3,8 +3,6 @@
 python tests/bench/operators.py [hash_grid|shading|split_sum] [--quick] [--out docs/benchmarks]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Split-sum shading and the pre-integration operator beside torch eager and torch.compile, and the memory's
 bandwidth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import reference

@@ -7,8 +7,6 @@ writes at its end. Existing rows with the same minutes and images are kept, so t
 table continues; --again makes them and their data anew. A run that fails leaves no row, and the next one begins.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import datetime

@@ -1,7 +1,5 @@
 """The errors of the split sum against the integral that it splits."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from scipy import ndimage

@@ -4,8 +4,6 @@ Values are baked into textures: of the asset itself where its charts do not over
 shading normals (interpolated and with the normal texture) and replace the receiving mesh's through its normal texture.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection
 
@@ -30,7 +28,7 @@ def bilinear(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
     x, y = uv[:, 0] * w - 0.5, uv[:, 1] * h - 0.5
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-    at = lambda j, i: texture[(y0 + j) % h, (x0 + i) % w]  # noqa: E731
+    at = lambda j, i: texture[(y0 + j) % h, (x0 + i) % w]
     return (at(0, 0) * (1 - fx) + at(0, 1) * fx) * (1 - fy) + (at(1, 0) * (1 - fx) + at(1, 1) * fx) * fy
 
 
@@ -50,7 +48,7 @@ def surface_values(asset: Asset, triangles: np.ndarray, weights: np.ndarray) -> 
         `albedo` [n, 3], `roughness` [n, 1], `metallic` [n, 1] and the unit shading `normals` [n, 3].
     """
     points = Texels(np.arange(len(triangles)), triangles, weights)
-    at = lambda values: points.interpolate(values, asset.triangles)  # noqa: E731
+    at = lambda values: points.interpolate(values, asset.triangles)
     albedo = np.ones((len(triangles), 3)) if asset.colors is None else at(asset.colors)
     rough_metal, normals = np.ones((len(triangles), 2)), at(asset.normals)
     uv = None if asset.uv is None else at(asset.uv)

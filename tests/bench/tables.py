@@ -6,8 +6,6 @@ The head of a table says at which commit it was made and which sources it measur
 pages of docs/benchmarks without such a head are unknown.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """Painted tubes: closed surfaces about curves, joined into one asset with one atlas."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -53,7 +51,7 @@ class Tube:
 
 def assemble(name: str, tubes: list[Tube], detail: float) -> Asset:
     """One mesh with one atlas: each strip of each tube is a band of texels across it."""
-    scale = lambda texels: max(8, round(texels * detail))  # noqa: E731
+    scale = lambda texels: max(8, round(texels * detail))
     width, height = scale(WIDTH), sum(tube.strips * scale(tube.texels) for tube in tubes)
     albedo, orm = np.zeros((height, width, 3)), np.zeros((height, width, 2))
     vertices, uv, triangles, normals, top, start = [], [], [], [], 0, 0

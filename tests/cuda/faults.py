@@ -6,8 +6,6 @@ Each fault is planted in a copy of the sources, built into the tests of tests/cu
 has to make them fail. Needs cmake, ninja and GoogleTest; about half an hour on one core. Exit code 1 where a fault is not found.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

@@ -9,8 +9,6 @@ Sums over a PNG's chunks and a zip's parts, which every mutation breaks, are men
 reader sees them.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import io

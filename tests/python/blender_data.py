@@ -1,7 +1,5 @@
 """A sphere seen by cameras around it, as files, and ways to break them."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

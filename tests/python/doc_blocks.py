@@ -7,8 +7,6 @@ A comment before a block says that it is not run, and why; the commands in it ar
     <!-- page not run: ... -->                              all blocks of the page
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 from dataclasses import dataclass, field

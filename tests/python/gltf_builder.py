@@ -1,7 +1,5 @@
 """Small glTF files for tests, put together by the specification and not by the program's writer."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -1,7 +1,5 @@
 """A grey sphere seen by cameras around it, written in each layout, and photos through lenses that bend."""
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Chromium, which looks at pages of the package for tests."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

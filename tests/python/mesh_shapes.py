@@ -1,7 +1,5 @@
 """Meshes, and what their vertices see, for the tests of occlusion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 

@@ -4,8 +4,6 @@ A new operator has one line in :data:`CASES`. What a line needs stands above it,
 take their inputs from here as well.
 """
 
-from __future__ import annotations
-
 import functools
 
 import torch
@@ -60,7 +58,7 @@ def octahedral_directions(n: int) -> torch.Tensor:
     centres = (torch.arange(n, dtype=torch.float64) + 0.5) * 2 / n - 1
     y, x = torch.meshgrid(centres, centres, indexing="ij")
     z = 1 - x.abs() - y.abs()
-    sign = lambda v: torch.where(v < 0, -1.0, 1.0).double()  # noqa: E731
+    sign = lambda v: torch.where(v < 0, -1.0, 1.0).double()
     below = z < 0
     x, y = torch.where(below, (1 - y.abs()) * sign(x), x), torch.where(below, (1 - x.abs()) * sign(y), y)
     return unit(torch.stack([x, y, z], -1).reshape(-1, 3))
@@ -342,8 +340,8 @@ def moved(op: str, inputs: tuple, device: str) -> tuple:
 
 def truth(inputs: tuple) -> tuple:
     """The same numbers in float64, but the table of the split sum, which is float32."""
-    is_table = lambda x: x.shape == (32, 32, 4)  # noqa: E731
-    doubled = lambda x: x.double() if x.is_floating_point() and not is_table(x) else x  # noqa: E731
+    is_table = lambda x: x.shape == (32, 32, 4)
+    doubled = lambda x: x.double() if x.is_floating_point() and not is_table(x) else x
     return tree_map(lambda x: doubled(x) if isinstance(x, torch.Tensor) else x, inputs)
 
 

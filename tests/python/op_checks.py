@@ -1,7 +1,5 @@
 """What the tests of all operators share: devices, opcheck, and the refusal of missing gradients."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
@@ -54,7 +52,7 @@ def check_op(op, inputs: tuple, differentiable: tuple = ()) -> None:
     torch.library.opcheck(op, inputs)
     if differentiable:
         torch.library.opcheck(op, grad_leaves(inputs, differentiable))
-    turned = lambda x: x.t().contiguous().t() if isinstance(x, torch.Tensor) and x.dim() == 2 and x.numel() else x  # noqa: E731
+    turned = lambda x: x.t().contiguous().t() if isinstance(x, torch.Tensor) and x.dim() == 2 and x.numel() else x
     strided = tree_map(turned, inputs)
     torch.library.opcheck(op, strided, test_utils=("test_schema", "test_faketensor"))
     for got, expected in zip(as_tuple(op(*strided)), as_tuple(op(*inputs))):

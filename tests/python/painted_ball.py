@@ -1,7 +1,5 @@
 """A ball with a colour and a roughness per side, its light, and photos that the path tracer makes of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

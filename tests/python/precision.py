@@ -1,7 +1,5 @@
 """Which precision of a GPU's matrix products is set while a function runs."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable
 

@@ -76,9 +76,8 @@ class PretendGraph(TorchDispatchMode):
                         self.before.setdefault(id(x), (x, x.clone()))
         result = func(*args, **kwargs)
         given = {memory(x) for x in tensors((args, kwargs))}
-        fresh = [
-            None if memory(x) in given else torch.ops.aten.alias(x) for x in tensors(result)
-        ]  # squeeze_ may follow
+        # squeeze_ may follow
+        fresh = [None if memory(x) in given else torch.ops.aten.alias(x) for x in tensors(result)]
         self.made.update(memory(x) for x in fresh if x is not None)
         writes = any(a.alias_info is not None and a.alias_info.is_write for a in func._schema.arguments)
         if writes or any(x is not None for x in fresh):  # else a view

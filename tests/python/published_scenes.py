@@ -1,7 +1,5 @@
 """An object and lights without any symmetry, written in the form of each published set, small."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Inputs of the operators of rays: drawn pixels, samples along rays, their weights and colours."""
 
-from __future__ import annotations
-
 import torch
 from op_checks import generator, rand, unit
 from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples

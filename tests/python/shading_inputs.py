@@ -1,7 +1,5 @@
 """Inputs of the operators that shade: split sum and sums over light."""
 
-from __future__ import annotations
-
 import torch
 from op_checks import generator, rand, unit
 from splitnerf.ops import brdf_lut

@@ -1,7 +1,5 @@
 """A painted ball on a painted table, photographed: closed forms in place of photos."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

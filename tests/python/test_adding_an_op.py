@@ -1,7 +1,5 @@
 """docs/adding-an-op.md: its code compiles against this checkout, and its test passes."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Damaged and hostile files in one table: the damage to a good one, and the line that names it. No crash, little memory."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import struct
@@ -458,7 +456,7 @@ def of_file(read: Callable[[Path], object]) -> Callable[[Path, object], object]:
     return lambda _, path: read(path)
 
 
-LOADED = lambda folder, _: load_dataset(folder)  # noqa: E731
+LOADED = lambda folder, _: load_dataset(folder)
 FORMS = {  # what writes a good folder, what reads it or the path that the damage gives, and the table of damages
     "transforms": (make_blender, LOADED, TRANSFORMS),
     "nerfstudio": (lambda root: write_transforms(root, masks=True), LOADED, NERFSTUDIO),

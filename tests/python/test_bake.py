@@ -1,7 +1,5 @@
 """Unwrapping, tangents and baking: texels, padding, normal maps and occlusion against closed forms."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -258,9 +256,8 @@ def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
     """A share that is x at x: at each texel's centre, but for the outer ones, which repeat what is next to them."""
 
     def factors(scene, points, normals, *args, offset, **kwargs):
-        assert (
-            normals == torch.tensor([0.0, 0.0, 1.0])
-        ).all() and offset == 0.037  # traced off the surface along its normal
+        # traced off the surface along its normal
+        assert (normals == torch.tensor([0.0, 0.0, 1.0])).all() and offset == 0.037
         return points[:, :1], None
 
     monkeypatch.setattr(bake, "occlusion_factors", factors)

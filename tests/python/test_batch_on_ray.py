@@ -1,7 +1,5 @@
 """splitnerf batch on Ray: a damaged scene beside a good one; who can reach it; what it leaves."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -175,7 +173,5 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, call):
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         asked = call(tmp_path, "--out", tmp_path / "out", "--address", address)
         assert asked.program.wait(TIMEOUT) == BAD_INPUT
-    assert (
-        asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers")
-        and len(asked.err.splitlines()) == 1
-    )
+    assert asked.err.startswith(f"splitnerf: --address {address}: no Ray cluster answers")
+    assert len(asked.err.splitlines()) == 1

@@ -1,7 +1,5 @@
 """The benchmarks' own arithmetic: fronts, files, lights, and that a wrong subject is refused before it is timed."""
 
-from __future__ import annotations
-
 import csv
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """From photographs to data: each part against closed forms, and the whole on a painted ball."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import subprocess
@@ -260,9 +258,8 @@ def test_files_tell_of_turns_and_exposures(tmp_path):
     assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
     assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
     assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
-    assert first.exposure == pytest.approx(0.25) and first.focal == pytest.approx(
-        26 / np.hypot(36, 24) * np.hypot(20, 30)
-    )
+    assert first.exposure == pytest.approx(0.25)
+    assert first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
     assert (second.exposure, second.focal) == (None, None)
 
 

@@ -1,7 +1,5 @@
 """The cells of the sky: whose light they hold, and where their shadows fall."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """What a checkpoint may hold, and what a run takes back from it: a file from anywhere costs one line, not a crash, code or memory."""
 
-from __future__ import annotations
-
 import errno
 import functools
 import io

@@ -1,7 +1,5 @@
 """The command line: help, names, completion, and commands of plugins."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import shutil

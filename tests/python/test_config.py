@@ -1,7 +1,5 @@
 """Settings: what each is by default and in the presets, what it may be, and by which names it is known."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
@@ -260,9 +258,8 @@ def test_the_file_has_a_table_for_each_group(tmp_path):
     path = tmp_path / "config.toml"
     preset("paper").write(path)
     table = tomllib.loads(path.read_text())
-    assert (
-        list(table) == list(GROUPS) and table["surface"]["n_levels"] == 16 and table["constants"]["light_width"] == 256
-    )
+    assert list(table) == list(GROUPS) and table["surface"]["n_levels"] == 16
+    assert table["constants"]["light_width"] == 256
     path.write_text('seed = 3\nlight_kind = "mlp"\nlight_width = 32\n')
     assert Config.read(path) == Config().replace({"run.seed": 3, "light.kind": "mlp", "constants.light_width": 32})
 

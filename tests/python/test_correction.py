@@ -1,7 +1,5 @@
 """What the sum over directions puts in the split sum's place, and when; what a model hands on to its parts."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 import trimesh

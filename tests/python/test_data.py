@@ -1,7 +1,5 @@
 """Data sets: layouts, the shared frame, truth maps, and lenses that bend."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path
@@ -244,9 +242,8 @@ def test_a_bent_photo_is_as_a_pinhole_takes_it(name):
     u, v = u * fx + cx, v * fy + cy
     inside = (u > 0.5) & (u < WIDTH - 0.5) & (v > 0.5) & (v < HEIGHT - 0.5)
     assert (known == inside).mean() > 0.999 and known.mean() > 0.7
-    middle = (
-        inside & (u > 4) & (u < WIDTH - 4) & (v > 4) & (v < HEIGHT - 4)
-    )  # where all samples of the cubic lie in the photo
+    # where all samples of the cubic lie in the photo
+    middle = inside & (u > 4) & (u < WIDTH - 4) & (v > 4) & (v < HEIGHT - 4)
     error = np.abs(straight - pattern(x, y))
     assert error[middle].max() < 0.004 and error[inside].max() < 0.03
     assert np.abs(photo - pattern(x, y))[middle].max() > 0.03  # it was bent

@@ -1,7 +1,5 @@
 """The trainer on another device than the CPU, by tensors that only say so."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """What is shipped: requirements and licences, wheels, the source archive."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

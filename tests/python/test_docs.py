@@ -3,8 +3,6 @@
 Commands run on a tiny scene with options that make them short; :mod:`doc_blocks` says how a page marks what cannot run.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import json

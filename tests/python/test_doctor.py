@@ -1,7 +1,5 @@
 """splitnerf doctor: here all is well, and what is wrong is found."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -288,11 +286,8 @@ class TestChoice:
 
     def test_the_command_says_which(self, gpu, capsys):
         gpu(failed=["composite"])
-        assert (
-            device_for("auto", False) == "cpu"
-            and device_for("cuda", False) == "cuda"
-            and device_for("cpu", True) == "cpu"
-        )
+        assert device_for("auto", False) == "cpu" and device_for("cuda", False) == "cuda"
+        assert device_for("cpu", True) == "cpu"
         assert "note: trains on the CPU: the Big GPU fails the test of composite" in capsys.readouterr().err
         gpu()
         assert device_for("auto", False) == "cuda"

@@ -1,7 +1,5 @@
 """Scores of runs and assets: free scales, relighting, tables and sheets by closed forms; what the command refuses; LPIPS."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -283,9 +281,8 @@ def test_an_assets_maps_are_those_of_each_view(asset_views):
     seeds = {asked[-1] for asked in renderer.asked}
     assert len(seeds) == len(predictions) == 3 and min(seeds) >= 2**31
     prediction = predictions[0]
-    assert prediction["normal"][3, 4] == pytest.approx(TILTED) and prediction["rgb"][3, 4] == pytest.approx(
-        linear_to_srgb(np.float32([0.8, 0.4, 1]))
-    )
+    assert prediction["normal"][3, 4] == pytest.approx(TILTED)
+    assert prediction["rgb"][3, 4] == pytest.approx(linear_to_srgb(np.float32([0.8, 0.4, 1])))
     known = {"alpha": 0.5, "albedo": [0.1, 0.2, 0.3], "roughness": 0.4, "metallic": 0.7}
     assert all(prediction[name][3, 4] == pytest.approx(value) for name, value in known.items())
     assert "rgb" not in asset_predictions(Answers(), asset_views, None, spp=1)[0]
@@ -324,11 +321,8 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
     path = tmp_path / "ball.glb"
     write_glb(path, bare(mesh, Material("grey", (0.5, 0.5, 0.5), 0.5)))
     plain = evaluate_asset(path, data, Protocol(spp=1, views=1))
-    assert (
-        plain.dataset.split == "test"
-        and len(plain.predictions) == 1
-        and plain.scores["novel_view"] is plain.scores["light_psnr"] is None
-    )
+    assert plain.dataset.split == "test" and len(plain.predictions) == 1
+    assert plain.scores["novel_view"] is plain.scores["light_psnr"] is None
     assert plain.scores["chamfer"] < 0.02 and plain.scores["f_score"] > 0.9
     light = read_image(data / "light.hdr")
     write_image(tmp_path / "environment.exr", light)

@@ -1,7 +1,5 @@
 """Every example runs, and prints numbers that are as good as it claims."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

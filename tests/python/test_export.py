@@ -1,7 +1,5 @@
 """Exports: axes, winding, textures, nothing written for a degenerate mesh, and the command."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 import json
@@ -241,9 +239,8 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     options = ["--out", str(out), "--faces", "1000", "--texture-size", "128", "--formats", "glb,ply,obj"]
     assert main(["export", str(run), *options]) == DONE
     line = capsys.readouterr().out.splitlines()[0]
-    assert line.startswith("mesh: watertight, 1000 faces of ") and line.endswith(
-        ", 0 floating or enclosed components dropped"
-    )
+    assert line.startswith("mesh: watertight, 1000 faces of ")
+    assert line.endswith(", 0 floating or enclosed components dropped")
     assert {p.name for p in out.iterdir()} == {
         "mesh.glb",
         "mesh.ply",

@@ -1,7 +1,5 @@
 """Exposures of photos that training learns: their estimate, the loss at a photo's own exposure, and the files of a run."""
 
-from __future__ import annotations
-
 import json
 import math
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Results are written whole or not at all, and one program at a time writes into a folder."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os
@@ -66,7 +64,7 @@ def test_a_file_is_on_the_disk_before_it_takes_its_name(tmp_path, monkeypatch):
     """And the folder with the new name after it."""
     order = []
     sync, replace = os.fsync, os.replace
-    name_of = lambda handle: os.readlink(f"/proc/self/fd/{handle}")  # noqa: E731
+    name_of = lambda handle: os.readlink(f"/proc/self/fd/{handle}")
     monkeypatch.setattr(os, "fsync", lambda handle: order.append(name_of(handle)) or sync(handle))
     monkeypatch.setattr(os, "replace", lambda *names: order.append("replace") or replace(*names))
     with atomic_path(tmp_path / "a.txt") as temporary:

@@ -1,7 +1,5 @@
 """Numbers that are not finite: each is planted once, is named, and costs no checkpoint."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """glTF files: axes, transforms, exact factors, textures in their colour spaces, and a clear line for what is wrong."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

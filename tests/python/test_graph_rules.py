@@ -1,7 +1,5 @@
 """When a step is recorded, repeated, or taken without a graph, and what goes into a graph and comes out of it."""
 
-from __future__ import annotations
-
 import functools
 import gc
 from contextlib import contextmanager, nullcontext
@@ -212,10 +210,8 @@ def test_a_pool_whose_graphs_are_all_gone_is_not_recorded_into(step):
     assert ways(step, 3, n_rays=6) == ["called", "recorded", "repeated"] and step._pool == first
     step._graphs.clear()
     assert ways(step, 1) == ["recorded"] and step._pool != first
-    assert step.taken(counts=(1164.0, 300.0)).complete and ways(step, 2) == [
-        "recorded",
-        "repeated",
-    ]  # the only one, anew
+    # the only one, anew
+    assert step.taken(counts=(1164.0, 300.0)).complete and ways(step, 2) == ["recorded", "repeated"]
 
 
 def test_four_graphs_are_kept_and_the_oldest_makes_room(step):
@@ -284,15 +280,11 @@ def test_the_copy_of_16_bits_is_made_outside_of_a_graph(step):
 def test_a_capacity_comes_in_units_and_holds_all_or_not():
     assert [in_units(n) for n in (0, 1, 256, 256.9, 257, 1150)] == [0, 256, 256, 256, 512, 1280]
     capacity = Capacity(5, 10, 20)
-    assert (
-        capacity.holds(Capacity(5, 10, 20))
-        and capacity.holds(Capacity(0, 0, 0))
-        and Capacity().holds(Capacity(1e9, 1e9, 1e9))
-    )
+    assert capacity.holds(Capacity(5, 10, 20)) and capacity.holds(Capacity(0, 0, 0))
+    assert Capacity().holds(Capacity(1e9, 1e9, 1e9))
     assert not any(capacity.holds(more) for more in (Capacity(6, 10, 20), Capacity(5, 11, 20), Capacity(5, 10, 21)))
-    assert Capacity(5.5, 11, 22).holds(capacity, slack=1.1) and not Capacity(5.5, 11, 22).holds(
-        Capacity(5, 10, 20.1), slack=1.1
-    )
+    assert Capacity(5.5, 11, 22).holds(capacity, slack=1.1)
+    assert not Capacity(5.5, 11, 22).holds(Capacity(5, 10, 20.1), slack=1.1)
     assert Capacity().of_shading is None and capacity.of_shading == (10, 20)
 
 

@@ -1,7 +1,5 @@
 """The small networks by their own weights: layers, where they start, and what each of their outputs is."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Numbers that would end the process: those of the tracer. They are refused, or meet nothing."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

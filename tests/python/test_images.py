@@ -1,7 +1,5 @@
 """Image files and environment maps: what is read is what was written, averages and turns are in linear light."""
 
-from __future__ import annotations
-
 import numpy as np
 import OpenImageIO as oiio
 import pytest

@@ -1,7 +1,5 @@
 """Forms in which photos, masks, lenses and lists come, and that each is read as it is meant."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

@@ -1,7 +1,5 @@
 """splitnerf inspect: data without fault raise no suspicion, and each fault that is made is found where it is."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

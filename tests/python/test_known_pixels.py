@@ -1,7 +1,5 @@
 """What masks mean, and that pixels which say nothing are used nowhere."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -52,10 +50,8 @@ def test_masks_of_the_object_are_told_by_their_look(tmp_path, capsys):
     assert data.known is None and 0.3 < data.images[..., 3].mean() < 0.5
     load_dataset(tmp_path, "test")
     said = notes(capsys)
-    assert (
-        said.count("\n") == 1
-        and f"{tmp_path}: its mask files are taken for the object's, white on 39% of the photos" in said
-    )
+    assert said.count("\n") == 1
+    assert f"{tmp_path}: its mask files are taken for the object's, white on 39% of the photos" in said
 
 
 def test_masks_that_keep_nearly_all_say_what_to_ignore(tmp_path, capsys):
@@ -240,10 +236,8 @@ def test_scores_are_over_known_pixels(half_known):
     full = evaluate_maps(predictions, dataclasses.replace(data, known=None), truths)["novel_view"]["psnr"]
     shares = [(i[..., 3] * k).sum() / k.sum() for i, k in zip(data.images, data.known)]
     expected = np.mean([-10 * np.log10(0.01 * share) for share in shares])
-    assert (
-        evaluate_maps(predictions, data, truths)["novel_view"]["psnr"] == pytest.approx(expected, abs=1e-3)
-        and full < expected
-    )
+    assert evaluate_maps(predictions, data, truths)["novel_view"]["psnr"] == pytest.approx(expected, abs=1e-3)
+    assert full < expected
 
 
 # ---- where the object stands ----

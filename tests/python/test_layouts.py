@@ -1,7 +1,5 @@
 """Layouts are recognised by themselves, the same cameras come out of each, and a run holds out what it was asked to."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

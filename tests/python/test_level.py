@@ -1,7 +1,5 @@
 """The level of the light by what dielectrics reflect."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light

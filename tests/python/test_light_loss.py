@@ -1,7 +1,5 @@
 """The light's consistency loss by lights whose integrals are known, and what the other terms draw."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The light as a network, by its own weights: its waves, layers, activations, and where it starts."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import generator, unit

@@ -1,7 +1,5 @@
 """The parts that lights share: how many directions, gradients that gather, other tensors in their place, panoramas."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

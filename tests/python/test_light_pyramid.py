@@ -1,7 +1,5 @@
 """The explicit light: its filtered maps and harmonics against integrals of its own texels, and its shared chain."""
 
-from __future__ import annotations
-
 import copy
 import math
 import os
@@ -32,7 +30,7 @@ def box_filtered(radiance_of, n: int, k: int = 8) -> torch.Tensor:
     """[n^2, 3] means over the texels by solid angle, from k^2 directions each."""
     directions = octahedral_directions(n * k)
     density = (directions.abs().sum(1) ** 3)[:, None]
-    blocks = lambda x: x.view(n, k, n, k, -1).sum((1, 3)).reshape(n * n, -1)  # noqa: E731
+    blocks = lambda x: x.view(n, k, n, k, -1).sum((1, 3)).reshape(n * n, -1)
     return blocks(radiance_of(directions) * density) / blocks(density)
 
 

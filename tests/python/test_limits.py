@@ -1,7 +1,5 @@
 """The swap table on a scene of two balls, and the assets that are hard to reconstruct."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

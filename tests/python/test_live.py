@@ -1,7 +1,5 @@
 """A run in the page while it trains: what the server tells and serves of it, and what its buttons do."""
 
-from __future__ import annotations
-
 import functools
 import json
 import socket
@@ -313,7 +311,6 @@ def test_a_delivered_asset_that_cannot_be_read_is_said(error, stepped, tmp_path,
 
     monkeypatch.setattr(stepped.live.shown, "source_of", read)
     status, _, content = ask(stepped.server, "scene.json")
-    assert (
-        status == 200 and f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
-    )
+    assert status == 200
+    assert f"{tmp_path}: cannot be shown ({type(error).__name__}" in json.loads(content)["problems"][0]
     assert stepped.live.events.state["version"] == 0  # pages wait for no newer one

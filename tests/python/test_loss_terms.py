@@ -1,7 +1,5 @@
 """The terms of the loss in preset `paper`, as its equations print them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import pytest

@@ -1,7 +1,5 @@
 """splitnerf batch, without Ray: names, options, shares, the table, processes, and what follows from how they end."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -342,7 +340,7 @@ def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
     """A batch that ran with a pretended Ray; its rows and notes, and whether all came to an end."""
     known, rows, notes = known_scenes(tmp_path), [], []
     asked = requested_scenes(known, [Path(data) for data in ends])
-    row = lambda scene: rows.append((scene.name, scene.state))  # noqa: E731
+    row = lambda scene: rows.append((scene.name, scene.state))
     batch = BatchPlan(tmp_path, known, asked, ["--steps=4"], retries, row, notes.append)
     ray = PretendRay({data: list(end) for data, end in ends.items()})
     return batch, ray, rows, notes, run_batch(ray, batch, Share(1, 0, 4))

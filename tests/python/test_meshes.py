@@ -1,7 +1,5 @@
 """The surface of a training as a mesh, made at once or beside the training."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshing by closed forms, what photos show of a mesh, and the cap over what they do not show."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -39,10 +37,8 @@ def test_sphere_converges_in_area_and_volume():
     errors = []
     for n in (17, 33, 65):
         mesh = trimesh.Trimesh(*extract_mesh(sphere, 1.5, n), process=False)
-        assert (
-            mesh.is_watertight
-            and np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.3 * (3 / (n - 1)) ** 2
-        )
+        assert mesh.is_watertight
+        assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.3 * (3 / (n - 1)) ** 2
         errors.append([4 / 3 * math.pi * RADIUS**3 - mesh.volume, 4 * math.pi * RADIUS**2 - mesh.area])
     errors = np.array(errors)
     assert (errors > 0).all()  # chords lie inside
@@ -113,9 +109,8 @@ def test_small_components_go_and_are_counted():
         return torch.minimum(sphere(x), torch.minimum(sphere(x - far, 0.05), sphere(x - near, 0.2)))
 
     vertices, faces = extract_mesh(three, 1.5, 96)
-    vertices = np.concatenate(
-        [vertices, np.full((3, 3), 9.0, np.float32)]
-    )  # of no face: no component, and gone as well
+    # of no face: no component, and gone as well
+    vertices = np.concatenate([vertices, np.full((3, 3), 9.0, np.float32)])
     vertices, faces, n_dropped = drop_floaters_and_cavities(vertices, faces)
     assert n_dropped == 1  # the middle one has more than a hundredth of the faces
     assert vertices.max() == pytest.approx(RADIUS, abs=0.01) and vertices[:, 0].min() == pytest.approx(-1.4, abs=0.01)
@@ -272,9 +267,8 @@ def test_one_ray_that_slips_through_shows_nothing():
 def test_behind_a_camera_nothing_is_seen():
     pose = torch.eye(4)
     pose[2, 3] = -DISTANCE  # looks down, away from the sphere
-    assert not seen(
-        round_body(0.5), from_above(focal=1e-4)._replace(poses=pose[None])
-    ).any()  # so wide that it would show all
+    # so wide that it would show all
+    assert not seen(round_body(0.5), from_above(focal=1e-4)._replace(poses=pose[None])).any()
 
 
 def test_a_flat_rim_gets_a_flat_cap():

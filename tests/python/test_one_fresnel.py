@@ -1,7 +1,5 @@
 """Training's shading and the path tracer have one BSDF: a plane of any material, seen at any angle, under any light."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch
@@ -39,7 +37,7 @@ def path_traced(environment: np.ndarray, cosine: float, roughness: float, metall
 
 def point(cosine: float, roughness: float, metallic: float) -> tuple[torch.Tensor, ...]:
     """Normal, view, albedo, roughness and metallic of the same plane, one row."""
-    column = lambda x: torch.tensor([[x]])  # noqa: E731
+    column = lambda x: torch.tensor([[x]])
     view = torch.from_numpy(view_at(cosine)).float()[None]
     return torch.tensor([[0.0, 0.0, 1.0]]), view, torch.tensor([ALBEDO]), column(roughness), column(metallic)
 

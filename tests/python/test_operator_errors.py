@@ -1,7 +1,5 @@
 """Every operator with arguments that do not fit: the message names operator and argument."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch

@@ -1,7 +1,5 @@
 """Every operator on the inputs of op_cases: its reference, its gradients, what torch asks of it, few points, and errors."""
 
-from __future__ import annotations
-
 import inspect
 import subprocess
 import sys
@@ -42,12 +40,8 @@ DIFFERENTIABLE = {
     for op, names in (cases.DIFFERENTIABLE | {"quadratic_entropy": "x"}).items()
 }
 FORWARD = sorted(name for name in EVERY if "_backward" not in name)
-BEHIND = {
-    "read_pixels",
-    "occlusion_factors",
-    "incoming_light",
-    "visibility_bits",
-}  # the points are their second argument
+# the points are their second argument
+BEHIND = {"read_pixels", "occlusion_factors", "incoming_light", "visibility_bits"}
 WHOLE_NUMBERS = {"visibility_bits", "vertex_grids"}  # their results
 TWICE = {"sparse_product"}  # whose gradient has gradients
 

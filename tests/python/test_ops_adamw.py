@@ -1,7 +1,5 @@
 """AdamW as one operator: against torch's, in float64, at the ends of the range; rows left alone; copies; states exchanged."""
 
-from __future__ import annotations
-
 import copy
 import math
 

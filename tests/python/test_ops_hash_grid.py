@@ -1,7 +1,5 @@
 """hash_encode outside of the cube and with tables of 16 bits, the module that holds a grid and its copy, and the field on one."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, hash_inputs, sampling_settings
@@ -113,7 +111,7 @@ def test_a_table_and_a_copy_of_other_dtypes_or_sizes_are_named():
         ((positions.double(), double, *grid, half), ("stored", "beside a float32 table", "float64")),
         ((positions, table, *grid, half[1:]), ("stored", str(n), str(n - 1))),
     ):
-        check_error(lambda: lib.hash_encode(*arguments), "hash_encode", *parts)  # noqa: B023
+        check_error(lambda: lib.hash_encode(*arguments), "hash_encode", *parts)
     doubles = [x.double() if isinstance(x, torch.Tensor) else x for x in CASES["sdf_values"](torch.float32)]
     check_error(lambda: lib.sdf_values(doubles[0], doubles[1].half(), *doubles[2:]), "sdf_values", "table", "float64")
     check_error(lambda: HashGrid(HASH_SPEC, table_dtype=torch.float64), "table_dtype", "float16", "float64")

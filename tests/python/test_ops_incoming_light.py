@@ -1,7 +1,5 @@
 """incoming_light: its directions, densities and the light that it finds, against closed forms and the path tracer."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """prefilter_light, fibonacci_directions and sample_ggx_lobe."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import generator, unit

@@ -1,7 +1,5 @@
 """sparse_product, light_lookup and the maps between the texels of an explicit light."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

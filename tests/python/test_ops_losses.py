@@ -1,7 +1,5 @@
 """Terms of the loss and the curve of sRGB: closed forms, and numbers at which the formulas bend."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

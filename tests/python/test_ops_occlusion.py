@@ -1,7 +1,5 @@
 """Rays of a mesh and occlusion_factors, with trimesh and embreex as the independent oracle."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """draw_rays and read_pixels."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import generator

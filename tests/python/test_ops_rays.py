@@ -1,7 +1,5 @@
 """surface_weights, spread_samples, interpolate and composite."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import check_error, generator, lib
@@ -54,9 +52,8 @@ def test_spread_draws_all_and_names_the_heaviest():
     weights, samples, phase = packed_samples()
     spread = spread_samples(weights, samples, 0, phase)
     n = len(weights)
-    assert torch.equal(spread.shaded, torch.arange(n)) and torch.equal(
-        spread.interpolate(weights[:, None])[:, 0], weights
-    )
+    assert torch.equal(spread.shaded, torch.arange(n))
+    assert torch.equal(spread.interpolate(weights[:, None])[:, 0], weights)
     for per_ray in (0, 2):
         spread = spread_samples(weights, samples, per_ray, phase)
         rays = samples.ray_indices[spread.shaded]

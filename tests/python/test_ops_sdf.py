@@ -1,7 +1,5 @@
 """sdf_field, sdf_values, and sample_rays: what it keeps against all samples, and thin parts."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -124,7 +122,7 @@ def left_out(field, s: float, anneal: float = 1.0, lipschitz: float = 1.25) -> t
         there.sdf.detach(), there.gradient.detach(), d, sharp, samples.offsets, step=STEP, anneal=anneal
     )
     kept, _, _ = sampled(field, (o, d, jitter), s=s, anneal=anneal, min_weight=1e-3, reach=7.0 / s, lipschitz=lipschitz)
-    lattice = lambda some: some.ray_indices * 100000 + (some.t_starts / STEP * 8).round().long()  # noqa: E731
+    lattice = lambda some: some.ray_indices * 100000 + (some.t_starts / STEP * 8).round().long()
     faint = torch.where(torch.isin(lattice(samples), lattice(kept)), 0.0, weights)
     return faint, torch.zeros(len(o), dtype=torch.float64).index_add(0, samples.ray_indices, faint)
 
@@ -152,7 +150,7 @@ def test_a_field_far_steeper_than_promised_costs_few_distances():
     hidden = torch.zeros(2, 3 + SDF_SPEC.n_outputs, dtype=torch.float64)
     hidden[0, 2], hidden[1, 2] = 1.0, -1.0
     out = torch.tensor([[2.5, -2.5]], dtype=torch.float64)
-    bias = lambda *x: torch.tensor(x, dtype=torch.float64)  # noqa: E731
+    bias = lambda *x: torch.tensor(x, dtype=torch.float64)
     plane = SdfNetwork(SDF_SPEC, 3, zeros, hidden, bias(0.0, 0.0), out, bias(0.5), 1e5, BOX)
     o, d = torch.zeros(7, 3, dtype=torch.float64), torch.zeros(7, 3, dtype=torch.float64)
     o[:, 0], o[:, 2], d[:, 2] = torch.linspace(-1, 1, 7), 0.6, -1.0

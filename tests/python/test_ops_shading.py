@@ -1,7 +1,5 @@
 """light_queries, split_sum_shade, and the sums over directions: monte_carlo_light, summed_light and shade_sums."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

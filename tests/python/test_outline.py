@@ -1,7 +1,5 @@
 """Parts of the refinement with a closed form of their own: the outline, and the compact lamp."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import replace
 
@@ -206,7 +204,7 @@ def shaded_albedo(asset, radius: float, light: np.ndarray, texture: float = 0.3)
     normals = unit(covered.interpolate(asset.normals, asset.triangles))
     origins = covered.interpolate(asset.vertices, asset.triangles) + 5e-3 * normals
     points = Points(MeshScene(asset.vertices, asset.triangles), origins, normals, normals, np.zeros(len(origins)))
-    arriving = lambda directions, powers: points.cosines(directions) @ powers.mean(axis=1)  # noqa: E731
+    arriving = lambda directions, powers: points.cosines(directions) @ powers.mean(axis=1)
     believed = arriving(*parts_of_light(light, 512))
     lamp = arriving(disc(SUN, radius, 64), np.broadcast_to(POWER / 64, (64, 3)))
     true = arriving(*parts_of_light(np.full((8, 16, 3), 0.3, np.float32), 512)) + lamp

@@ -1,7 +1,5 @@
 """The lines of the examples that the pages show are the examples' own."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Photos in memory: as whole numbers within a budget, else in a file; averages of large ones."""
 
-from __future__ import annotations
-
 import math
 import platform
 import subprocess

@@ -1,7 +1,5 @@
 """Losses and the shading model against closed forms."""
 
-from __future__ import annotations
-
 import copy
 import math
 from types import SimpleNamespace

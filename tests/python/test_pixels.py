@@ -1,7 +1,5 @@
 """The pixels that a step draws: their rays, backgrounds and jitter, and those along the masks' edges."""
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
 from types import SimpleNamespace
@@ -21,9 +19,8 @@ from splitnerf.training.batches import DrawnRays, EdgePixels, PixelSource, band,
 from tiny_runs import tiny
 
 HEIGHT, WIDTH = 20, 32
-LENSES = np.array(
-    [[40.0, 44.0, 15.0, 11.0], [30.0, 30.0, 16.0, 10.0], [55.0, 50.0, 17.5, 8.5]], np.float32
-)  # fx, fy, cx, cy
+# fx, fy, cx, cy
+LENSES = np.array([[40.0, 44.0, 15.0, 11.0], [30.0, 30.0, 16.0, 10.0], [55.0, 50.0, 17.5, 8.5]], np.float32)
 POSES = np.stack([look_at(np.array(x), np.zeros(3)) for x in ((3, 1, 1), (-2, 2, 0.5), (0.3, -3, 2))]).astype(
     np.float32
 )
@@ -79,11 +76,8 @@ def test_most_of_the_rays_are_near_the_masks_and_the_others_anywhere(dataset):
     assert near.float().mean().item() == pytest.approx(0.75 + 0.25 * share, abs=0.01)
     counts = torch.bincount(row[near].round().long() * WIDTH + column[near].round().long())
     counts = counts[counts > 0]
-    assert (
-        len(counts) == 14 * 12
-        and counts.min() > 0.7 * counts.float().mean()
-        and counts.max() < 1.3 * counts.float().mean()
-    )
+    assert len(counts) == 14 * 12 and counts.min() > 0.7 * counts.float().mean()
+    assert counts.max() < 1.3 * counts.float().mean()
     assert column[~near].min() == 0 and column[~near].max().round() == WIDTH - 1
 
 
@@ -237,9 +231,8 @@ def test_what_lies_behind_is_beside_the_finest_parts_too():
     alpha = np.zeros((20, 30), np.float32)
     alpha[:, 15] = 0.4
     near, outside = band(alpha, 2)
-    assert np.array_equal(near.any(0).nonzero()[0], [15]) and np.array_equal(
-        (~outside).any(0).nonzero()[0], range(11, 20)
-    )
+    assert np.array_equal(near.any(0).nonzero()[0], [15])
+    assert np.array_equal((~outside).any(0).nonzero()[0], range(11, 20))
 
 
 def test_before_what_is_too_bright_for_the_photo_the_mask_decides():

@@ -1,7 +1,5 @@
 """What a long run shows of its progress, to a terminal, a log and TensorBoard, and how Ctrl-C reaches it."""
 
-from __future__ import annotations
-
 import io
 import signal
 import sys
@@ -40,11 +38,8 @@ def test_elsewhere_than_on_a_terminal_a_line_is_written_every_ten_seconds(clock,
             bar.show(share, f"step {round(10 * share)}")
         bar.show(1.0, "done")
     printed = capsys.readouterr()
-    assert printed.out == "" and printed.err.splitlines() == [
-        " 40% 00:10<00:30 step 4",
-        " 60% 00:20<00:20 step 6",
-        "100% 00:29<00:00 done",
-    ]
+    assert printed.out == ""
+    assert printed.err.splitlines() == [" 40% 00:10<00:30 step 4", " 60% 00:20<00:20 step 6", "100% 00:29<00:00 done"]
 
 
 def test_a_terminal_shows_a_bar(monkeypatch):

@@ -1,7 +1,5 @@
 """Published sets: what is written in the form of each is read again, and the protocols by closed forms."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """The protocols of published sets: closed forms of their formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

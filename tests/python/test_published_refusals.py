@@ -1,7 +1,5 @@
 """The protocols of published sets on data that are not the set's: empty masks, other forms, truth that lies elsewhere."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The refinement: its parts by closed forms, and a textured ball whose photos the path tracer made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -217,7 +215,7 @@ def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     values, sweeps = {name: AssetTexels(a).start for name, a in assets}, result.sweeps
     height = heights(AssetTexels(asset))[:, 0].abs()
     seen = (height > 0.1) & (height < 0.8)
-    error = lambda name: (values[name] - values["true"])[seen, :3].abs().mean().item()  # noqa: E731
+    error = lambda name: (values[name] - values["true"])[seen, :3].abs().mean().item()
     assert error("found") < 0.25 * error("wrong")
     assert values["found"][seen & (values["true"][:, 3] > 0.5), 3].mean() > 0.54  # 0.7 in truth, 0.5 at the start
     assert values["found"][seen, 4].mean() < 0.1  # no metal is invented
@@ -234,7 +232,7 @@ def test_a_wrong_light_comes_nearer_to_the_true_one(painted, monkeypatch):
     result = refine(data, asset, grey, settings)
     light, sweeps = result.light, result.sweeps
     cosine = np.sin((np.arange(16) + 0.5) * np.pi / 16)[:, None, None]
-    apart = lambda map_: (np.abs(np.log(map_) - np.log(sky())) * cosine).mean()  # noqa: E731
+    apart = lambda map_: (np.abs(np.log(map_) - np.log(sky())) * cosine).mean()
     assert apart(light) < 0.6 * apart(grey) and sweeps[-1].error < 0.1 * sweeps[0].error
     row, column = np.unravel_index(light.mean(2).argmax(), light.shape[:2])
     assert 2 <= row <= 5 and 5 <= column <= 9  # the lamp

@@ -1,7 +1,5 @@
 """The steps of the refinement: texels, their priors, and the light, by closed forms and by other solvers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import torch
@@ -117,9 +115,8 @@ def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    assert torch.isfinite(
-        usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]
-    ).all()  # one colour
+    # one colour
+    assert torch.isfinite(usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
@@ -137,9 +134,8 @@ def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
     positions[~of_gold.numpy()] += [0.7, 0, 0]
     found = usual_gloss(unknowns, unknowns, positions, 0)[:, 4]
     assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
-    assert (
-        usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9
-    ).all()  # the colour alone takes all
+    # the colour alone takes all
+    assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()
 
 
 def test_metal_does_not_spread_by_what_it_turned_into_metal():

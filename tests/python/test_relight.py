@@ -1,7 +1,5 @@
 """The relighter: cameras and composition by closed forms, the furnace through the whole command, clear errors."""
 
-from __future__ import annotations
-
 import json
 import sys
 

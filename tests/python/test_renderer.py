@@ -1,7 +1,5 @@
 """What a renderer finds, weighs and hands on: samples that matter, padding that does not, gradients that are derivatives."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import generator, unit
@@ -132,27 +130,20 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
     for more in (7, n + 3):
         padded = find_samples(model, cells, *rays, probes=probes, capacity=n + more)
         assert len(padded.directions) == len(padded.packed.middles) == n + more
-        assert torch.equal(padded.positions[:n], bare.positions[:n]) and torch.equal(
-            padded.positions[n + more :], bare.positions[n:]
-        )
+        assert torch.equal(padded.positions[:n], bare.positions[:n])
+        assert torch.equal(padded.positions[n + more :], bare.positions[n:])
         assert torch.equal(padded.positions[n : n + more], bare.positions[torch.arange(more) % n])
         assert torch.equal(padded.beside, bare.beside) and bare.beside.tolist() == [0, n // 2, int(0.999 * n)]
         ray, expected = rendered(model, padded, shades_per_ray=2), rendered(model, bare, shades_per_ray=2)
         torch.testing.assert_close((ray.mean, ray.opacity), (expected.mean, expected.opacity))
         assert torch.equal(ray.gradients[n + more :], expected.gradients[n:]) and (ray.weights[n:] == 0).all()
     cut = find_samples(model, cells, *rays, probes=probes, capacity=n - 1)
-    assert (
-        torch.equal(cut.positions[: n - 1], bare.positions[: n - 1])
-        and len(cut.directions) == n - 1
-        and int(cut.n_found) == n
-    )
+    assert torch.equal(cut.positions[: n - 1], bare.positions[: n - 1]) and len(cut.directions) == n - 1
+    assert int(cut.n_found) == n
     empty = torch.full_like(cells, CELL_EMPTY)
     nothing = find_samples(model, empty, *rays, probes=probes, capacity=4)
-    assert (
-        (nothing.positions[:4] == 0).all()
-        and torch.equal(nothing.positions[4:9], probes.anywhere)
-        and not nothing.beside.any()
-    )
+    assert (nothing.positions[:4] == 0).all() and torch.equal(nothing.positions[4:9], probes.anywhere)
+    assert not nothing.beside.any()
 
 
 # ---- shading ----

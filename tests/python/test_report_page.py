@@ -3,8 +3,6 @@
 Skipped where Node, Chromium or the packages of the pages' sources (`npm ci` there, or `make viewer`) are missing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from looking_at import look_at, needs_chromium
@@ -213,10 +211,8 @@ def test_the_exposure_changes_the_lights_pixels(seen):
 
 def test_curves_say_the_values_under_the_pointer(seen):
     texts = seen[0]["texts"]
-    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"] and texts["last"].split("\n") == [
-        "step 800",
-        "loss 0.003906",
-    ]
+    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"]
+    assert texts["last"].split("\n") == ["step 800", "loss 0.003906"]
     assert texts["terms"].split("\n") == ["step 800", "colour 1.000e-8", "late 0.001", "light 0.5"]
     assert texts["fewer"].split("\n") == ["step 800", "colour 1.000e-8", "light 0.5"]
     assert texts["zero"].split("\n") == ["step 0", "colour 1", "light 0.5"]

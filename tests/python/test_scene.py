@@ -1,7 +1,5 @@
 """Fields, occupancy, rendering, meshing and losses: closed forms of a sphere and of constant light."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -69,15 +67,11 @@ class TestAveragedGrid:
         inside = (asked[0] + 1.5) / (3.0 / 16)
         cell = inside.long()
         now = torch.zeros(4096, dtype=torch.bool).index_fill(0, (cell[:, 0] * 16 + cell[:, 1]) * 16 + cell[:, 2], True)
-        assert (
-            now.sum() == len(cell) and now[occupied].float().mean() > 0.8 and 0.15 < now[~occupied].float().mean() < 0.3
-        )
+        assert now.sum() == len(cell) and now[occupied].float().mean() > 0.8
+        assert 0.15 < now[~occupied].float().mean() < 0.3
         place = inside - cell
-        assert (
-            place.min() >= 0
-            and place.mean().item() == pytest.approx(0.5, abs=0.02)
-            and place.std().item() == pytest.approx(12**-0.5, abs=0.02)
-        )
+        assert place.min() >= 0 and place.mean().item() == pytest.approx(0.5, abs=0.02)
+        assert place.std().item() == pytest.approx(12**-0.5, abs=0.02)
         torch.testing.assert_close(grid.values, torch.where(now, 0.95 * before, before))
         grid.update(nothing, 200.0, first=True, step=300)
         grid.update(nothing, 200.0, first=False, step=255)

@@ -1,7 +1,5 @@
 """Every schedule of a training by its closed form, alone and as a run follows it."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The distance field by its own weights: one formula, whichever way it is asked, where it starts, and its gradients."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -34,7 +32,7 @@ def points(n: int = 60) -> torch.Tensor:
 
 def formula(field: SdfField, x: torch.Tensor) -> torch.Tensor:
     """W2 softplus(W1 [x, hash] + b1) + b2, softplus(y) = log(1 + exp(100 y)) / 100; rows of W are length w / |w|."""
-    rows = lambda w, length: length * w / w.norm(dim=1, keepdim=True)  # noqa: E731
+    rows = lambda w, length: length * w / w.norm(dim=1, keepdim=True)
     features = field.grid((x + BOX) / (2 * BOX))
     inputs = torch.cat([x, features], 1) @ rows(field.hidden_direction, field.hidden_length).T + field.hidden_bias
     hidden = torch.logaddexp(100 * inputs, torch.zeros(())) / 100
@@ -147,7 +145,5 @@ def test_the_sharpness_is_an_exponential_between_its_bounds():
     s = sharpness(v)
     assert s.tolist() == pytest.approx([math.exp(x) for x in (0, 0, 3, 8, 9, 9)], rel=1e-5)
     (slope,) = torch.autograd.grad(s.sum(), v)
-    assert (
-        slope[[2, 3]].tolist() == pytest.approx([10 * math.exp(3), 10 * math.exp(8)], rel=1e-5)
-        and not slope[[0, 5]].any()
-    )
+    assert slope[[2, 3]].tolist() == pytest.approx([10 * math.exp(3), 10 * math.exp(8)], rel=1e-5)
+    assert not slope[[0, 5]].any()

@@ -1,7 +1,5 @@
 """How the whole model shades a point, and what it asks of its parts: closed forms of the factors, and Fresnel's term."""
 
-from __future__ import annotations
-
 import pytest
 import reference
 import torch

@@ -1,7 +1,5 @@
 """What the sheet of pictures of an evaluation shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from splitnerf.data.images import linear_to_srgb, over_background, srgb_to_linear

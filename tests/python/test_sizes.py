@@ -1,7 +1,5 @@
 """Photos of several sizes in one data set: each is used as it is, and nothing is drawn beside it."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from functools import partial

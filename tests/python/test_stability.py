@@ -1,7 +1,5 @@
 """Every operator on inputs made to break it, a hundredth of `make stability`, and the harness itself."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -89,7 +87,7 @@ def planted(error, bound: float = 1e-6, **changes) -> Entry:
         x = rows["x"]
         return {"y": x * x * (1 + error(x)) if x.dtype == torch.float32 else x * x}
 
-    draw = lambda source, n: {"x": source.uniform(n, 1, low=0.5, high=2)}  # noqa: E731
+    draw = lambda source, n: {"x": source.uniform(n, 1, low=0.5, high=2)}
     options = {"draw": draw, "call": call, "smooth": ("x",), "gradient_bound": bound, "conditioned": False} | changes
     return Entry("planted", bound=bound, reason="x^2", **options)
 
@@ -100,7 +98,7 @@ def corner(size: float, low: float, high: float):
 
 def test_what_is_not_finite_is_counted():
     """Also where it is not a number in both precisions."""
-    nan = lambda rows, shared: {"y": torch.where((rows["x"] > 1.0) & (rows["x"] < 1.1), NAN, rows["x"] ** 2)}  # noqa: E731
+    nan = lambda rows, shared: {"y": torch.where((rows["x"] > 1.0) & (rows["x"] < 1.1), NAN, rows["x"] ** 2)}
     for entry in (planted(corner(INF, 1.0, 1.1)), planted(corner(0.0, 1, 1.1), call=nan)):
         found = search.run(entry, 2000)
         assert found.broken > 0 and not found.holds
@@ -132,8 +130,8 @@ def test_an_error_in_the_gradient_alone_is_caught():
 
 def test_the_search_finds_a_spot_that_drawing_does_not():
     """An error that grows to 1e-2 at 1.2345, a ten-thousandth wide: drawn numbers see its foot only."""
-    apart = lambda x: (x - 1.2345).abs()  # noqa: E731
-    slope = lambda x: 1e-2 * torch.exp(-1e4 * apart(x)) + 1e-3 / (1 + 300 * apart(x))  # noqa: E731
+    apart = lambda x: (x - 1.2345).abs()
+    slope = lambda x: 1e-2 * torch.exp(-1e4 * apart(x)) + 1e-3 / (1 + 300 * apart(x))
     entry = planted(slope, bound=1e-5)
     draw, drawn, best = cases.Draw(0), search.Tally(entry), search.Worst()
     given = cast(entry.draw(draw, 500), torch.float32)
@@ -145,7 +143,7 @@ def test_the_search_finds_a_spot_that_drawing_does_not():
 
 def test_the_condition_forgives_cancellation_but_no_other_error():
     """x - y of nearly equal numbers made by rounding x + 1 first: the error is a rounding of the inputs."""
-    draw = lambda source, n: {"x": 1 + 1e-4 * source.uniform(n, 1), "y": 1 + 1e-4 * source.uniform(n, 1)}  # noqa: E731
+    draw = lambda source, n: {"x": 1 + 1e-4 * source.uniform(n, 1), "y": 1 + 1e-4 * source.uniform(n, 1)}
 
     def difference(size):
         def call(rows, shared):

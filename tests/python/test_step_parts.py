@@ -1,7 +1,5 @@
 """Parts of a step by hand: points beside samples, corrections of rays, wide lobes, probes, and the losses of materials."""
 
-from __future__ import annotations
-
 import pytest
 import torch
 from op_checks import generator, rand
@@ -40,11 +38,8 @@ def test_without_samples_only_given_points_are_left():
     positions, directions, beside = placed(none, [0.5, 0.99], False)
     assert positions == [[5, 5, 5]] and len(directions) == 0 and beside == []
     positions, directions, beside = placed(none.extended(2), [0.5, 0.99], True)
-    assert (
-        positions == [[0, 0, 0], [0, 0, 0], [5, 5, 5], [0, 0, 1], [0, 0, 2]]
-        and not directions.any()
-        and beside == [0, 0]
-    )
+    assert positions == [[0, 0, 0], [0, 0, 0], [5, 5, 5], [0, 0, 1], [0, 0, 2]] and not directions.any()
+    assert beside == [0, 0]
 
 
 def test_probes_fill_the_cube_and_shifts_are_normal():
@@ -107,9 +102,8 @@ def test_metals_by_hand():
     """Eq. (18); a metal by halves; dark metals, but neither bright ones nor dielectrics; nothing costs nothing."""
     metallic, shares = torch.tensor([[1.0], [0.4]]), torch.tensor([0.5, 0.25])
     metal, binary, _ = material_losses(torch.ones(2, 3), metallic, shares)
-    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75) and binary.item() == pytest.approx(
-        0.25 * 0.24 / 0.75
-    )
+    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75)
+    assert binary.item() == pytest.approx(0.25 * 0.24 / 0.75)
     albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]])
     dark = material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[2]
     assert dark.item() == pytest.approx((1 - 0.2 / 0.4) / 3)

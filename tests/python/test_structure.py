@@ -1,7 +1,5 @@
 """The structure of the code: layers, budgets, and the walk of a step."""
 
-from __future__ import annotations
-
 from graphlib import CycleError, TopologicalSorter
 
 import budget

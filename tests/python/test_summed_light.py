@@ -1,7 +1,5 @@
 """Light summed over the directions of the visibility bits: its cells, the integral, and the white furnace."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

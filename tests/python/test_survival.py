@@ -1,7 +1,5 @@
 """A run survives what happens to it: signals, kills, full disks, damaged logs, readers that go away."""
 
-from __future__ import annotations
-
 import errno
 import multiprocessing
 import os

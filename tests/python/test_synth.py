@@ -1,7 +1,5 @@
 """Rendered data sets: what each layout's files hold against the renderer's arrays, and built-in shapes."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

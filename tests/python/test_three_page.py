@@ -3,8 +3,6 @@
 Skipped where Node, Chromium or the packages of the viewer's sources (`npm ci` there, or `make viewer`) are missing.
 """
 
-from __future__ import annotations
-
 import functools
 import shutil
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer

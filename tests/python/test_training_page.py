@@ -3,8 +3,6 @@
 Skipped where Node, Chromium or the packages of the page's sources (`npm ci` there, or `make viewer`) are missing.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 import threading
@@ -122,9 +120,8 @@ def test_the_page_of_a_run(walk):
     assert texts["button"] == "Resume" and texts["curve"] is True
     step = int(re.search(r"checkpoint of step ([\d,]+) saved", texts["saved"])[1].replace(",", ""))
     assert 0 < step <= trained.step
-    assert (
-        trained.finished and trained.step < 100_000 and load_checkpoint(run / "checkpoint.pt")["step"] == trained.step
-    )
+    assert trained.finished and trained.step < 100_000
+    assert load_checkpoint(run / "checkpoint.pt")["step"] == trained.step
     assert texts["buttons"] is True and texts["ended"] == "The end: the run is done."
 
 

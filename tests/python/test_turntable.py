@@ -1,7 +1,5 @@
 """Photos whose light is turned in each: what is read of it, the light that points and photos get, and what a run makes of it."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
@@ -98,9 +96,8 @@ def test_the_rotations_of_the_light_are_read(tmp_path):
     turn = about_z(30.0)[0]
     edit(tmp_path, lambda meta: meta["frames"][2].update(light_rotation=turn.tolist()))
     turned = load_dataset(tmp_path)
-    assert turned.light_turns[2] == pytest.approx(turn) and turned.light_turns[[0, 5]] == pytest.approx(
-        np.tile(np.eye(3), (2, 1, 1))
-    )
+    assert turned.light_turns[2] == pytest.approx(turn)
+    assert turned.light_turns[[0, 5]] == pytest.approx(np.tile(np.eye(3), (2, 1, 1)))
     assert turned.select([2]).light_turns == pytest.approx(turn[None])
     assert dataset_fingerprint(turned) != dataset_fingerprint(still)
 

@@ -1,7 +1,5 @@
 """The viewer's server: what it serves is what was given, to nobody but the page that it printed the address of."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import math
@@ -142,10 +140,8 @@ def test_a_server_for_all_machines_answers_to_addresses_alone(shown_run):
 
 def test_pages_are_told_to_load_nothing_from_elsewhere(served):
     headers = ask(served, "")[1]
-    assert (
-        headers["Content-Security-Policy"].startswith("default-src 'none'")
-        and "http" not in headers["Content-Security-Policy"]
-    )
+    assert headers["Content-Security-Policy"].startswith("default-src 'none'")
+    assert "http" not in headers["Content-Security-Policy"]
     assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
 
 
@@ -293,10 +289,8 @@ def test_pictures_are_those_of_the_path_tracer(shown_run, monkeypatch):
             )
             small, first, _, best = (picture.astype(np.float32) for _, _, picture in pictures)
             assert 0.1 < expected["alpha"].mean() < 0.9
-            assert (
-                np.abs(best[..., 3] - expected["alpha"]).max() < 0.25
-                and np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
-            )
+            assert np.abs(best[..., 3] - expected["alpha"]).max() < 0.25
+            assert np.abs(best[..., 3] - expected["alpha"]).mean() < 0.01
             inside = expected["alpha"] > 0.99
             truth = expected["radiance"][inside]
             assert best[inside, :3].mean(axis=0) == pytest.approx(truth.mean(axis=0), rel=0.03)

@@ -3,8 +3,6 @@
 Skipped where Node, Chromium or the packages of the page's sources (`npm ci` there, or `make viewer`) are missing.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

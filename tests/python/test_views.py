@@ -1,7 +1,5 @@
 """What views are made of: lengths of samples, maps channel by channel, the hull of masks, and what a model asks its occlusion."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -75,11 +73,8 @@ def test_each_map_of_a_view_shows_what_it_is_called():
     torch.testing.assert_close(maps["normal"][inside].norm(dim=1), torch.ones(int(inside.sum())))
     # x to the viewer, y to the right, z up
     row, column = 12, 12
-    assert (
-        maps["normal"][row, column, 0] > 0.9
-        and maps["normal"][row, column + 4, 1] > 0.2
-        and maps["normal"][row - 4, column, 2] > 0.2
-    )
+    assert maps["normal"][row, column, 0] > 0.9 and maps["normal"][row, column + 4, 1] > 0.2
+    assert maps["normal"][row - 4, column, 2] > 0.2
     assert (maps["rgb"] >= 0).all() and (maps["rgb"] <= 1).all()
 
 
@@ -198,9 +193,8 @@ def test_a_model_begins_as_it_is_set():
         models.append(SceneModel(config))
         inputs = torch.zeros(1, models[-1].material.net[0].in_features)
         _, found, metallic = models[-1].material(inputs)
-        assert found.item() == pytest.approx(roughness, abs=1e-5) and metallic.item() == pytest.approx(
-            1 / (1 + math.exp(2))
-        )
+        assert found.item() == pytest.approx(roughness, abs=1e-5)
+        assert metallic.item() == pytest.approx(1 / (1 + math.exp(2)))
         with torch.no_grad():
             models[-1].material.net[-1].bias.fill_(-50.0)
         assert models[-1].material(inputs)[1].item() == pytest.approx(0.2)

@@ -1,7 +1,5 @@
 """Visibility bits cached on a mesh: against rays, a closed form of occlusion, and the furnace of a bowl."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a model's visibility bits keep of a mesh and of the light, and which of it each answer is made of."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

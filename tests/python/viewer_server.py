@@ -1,7 +1,5 @@
 """A viewer's server in a thread, what it shows, and requests to it."""
 
-from __future__ import annotations
-
 import http.client
 import json
 from urllib.parse import urlsplit

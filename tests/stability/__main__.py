@@ -4,8 +4,6 @@ again in 50 digits, and writes the worst errors and their inputs. Exits with 1 w
     PYTHONPATH=tests python -m stability [--cases 10000000] [--op NAME ...]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

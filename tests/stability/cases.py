@@ -3,8 +3,6 @@
 Everything is drawn in float64 and rounded to float32 last, so that both precisions are asked the same numbers.
 """
 
-from __future__ import annotations
-
 import math
 
 import torch

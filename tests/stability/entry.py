@@ -1,7 +1,5 @@
 """What is said about an operator before it is asked: its inputs, its exact value and the error that it promises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Light in arbitrary precision: the pre-integrated lobe, octahedral maps and spherical harmonics."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -54,7 +52,7 @@ def read_map(texels: np.ndarray, n: int, w: list) -> list:
     size = mp.fsum(abs(x) for x in w)
     u, v = w[0] / size, w[1] / size
     if w[2] < 0:
-        fold = lambda x: -1 if x < 0 else 1  # noqa: E731
+        fold = lambda x: -1 if x < 0 else 1
         u, v = (1 - abs(v)) * fold(u), (1 - abs(u)) * fold(v)
     x, y = (u + 1) * n / 2 - mp.mpf("0.5"), (v + 1) * n / 2 - mp.mpf("0.5")
     i, j = int(mp.floor(x)), int(mp.floor(y))

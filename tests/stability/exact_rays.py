@@ -1,7 +1,5 @@
 """Weights of samples along a ray in arbitrary precision."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from stability.entry import Rows

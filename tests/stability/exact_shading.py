@@ -1,7 +1,5 @@
 """Shading in arbitrary precision, written from the equations: one point at a time, with mpmath."""
 
-from __future__ import annotations
-
 import numpy as np
 from splitnerf.ops import brdf_lut
 

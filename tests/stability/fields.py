@@ -1,7 +1,5 @@
 """Entries of the operators of the distance field: hash grid and network."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache

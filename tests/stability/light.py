@@ -1,7 +1,5 @@
 """Entries of the operators on light: filtering, lookup, sparse maps."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import torch

@@ -1,7 +1,5 @@
 """Entries of the terms of the training loss. A row is a batch of a few pixels, points or pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import torch

@@ -1,7 +1,5 @@
 """The error of an operator in float32, row by row."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

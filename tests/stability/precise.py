@@ -1,7 +1,5 @@
 """Arithmetic of 50 digits."""
 
-from __future__ import annotations
-
 import numpy as np
 from splitnerf.errors import InputError
 

@@ -4,8 +4,6 @@ A property takes (source, n) and gives [n] float64 violations, at most 0 where i
 finite, and the inputs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -254,7 +252,7 @@ def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     apart = (found - unit(axes.double())[:, None]).square().sum(-1)  # 2 (1 - cosine)
     cosine, b = 1 - apart / 2, (1 - a * a) / 2
     y, top = b * cosine.clamp(min=0) / (a * a + b * apart / 2), b / (a * a)
-    difference = lambda y: torch.where(y < 1e-3, y * y / 2 - y**3 / 3 + y**4 / 4, y - torch.log1p(y))  # noqa: E731
+    difference = lambda y: torch.where(y < 1e-3, y * y / 2 - y**3 / 3 + y**4 / 4, y - torch.log1p(y))
     cdf = torch.where(b < 1e-3, cosine.clamp(min=0) ** 2, difference(y) / difference(top))
     lattice = (1 - cdf) * count
     phase = torch.frac(lattice - lattice[:, :1] + count + 0.5) - 0.5

@@ -1,7 +1,5 @@
 """Entries of the operators along rays: weights of samples, and their sums."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import torch

@@ -1,7 +1,5 @@
 """Runs an operator over adversarial rows, searches around the worst of them, and asks the worst again exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Entries of the operators that shade: split sum, sums over incoming light, and the curve of images."""
 
-from __future__ import annotations
-
 import torch
 from splitnerf import ops
 from splitnerf.ops._library import lib

@@ -1,7 +1,5 @@
 """The table of worst errors, as Markdown and CSV, and the run of all operators."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
