@@ -90,19 +90,9 @@ def photos(
         maps = renderer.render(light, pose, lens, PHOTO, PHOTO, spp=spp, seed=i)
         straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-6)[..., None]
         images.append(np.dstack([linear_to_srgb(straight).clip(0, 1), maps["alpha"]]))
-    return Dataset(
-        "ball",
-        Path(),
-        "train",
-        1,
-        np.stack(images).astype(np.float32),
-        poses,
-        np.tile(np.float32(lens), (n, 1)),
-        [str(i) for i in range(n)],
-        [Path(str(i)) for i in range(n)],
-        np.eye(4),
-        light_turns=turns,
-    )
+    names, lenses = [str(i) for i in range(n)], np.tile(np.float32(lens), (n, 1))
+    seen, paths = np.stack(images).astype(np.float32), [Path(name) for name in names]
+    return Dataset("ball", Path(), "train", 1, seen, poses, lenses, names, paths, np.eye(4), light_turns=turns)
 
 
 def heights(texels: AssetTexels) -> torch.Tensor:

@@ -16,13 +16,15 @@ from PIL import Image
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material, vertex_tangents
+from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, read_image, read_radiance
 from splitnerf.export.scene import write_assets, write_environment, write_mesh_ply
 from splitnerf.export.writers import write_glb, write_obj, write_usdz
 from splitnerf.fields import Light
 from splitnerf.render.model import SceneModel
 from splitnerf.render.seen import Cameras
-from splitnerf.training.checkpoint import save_checkpoint
+from splitnerf.training.checkpoint import load_checkpoint
+from splitnerf.training.loop import Training
 
 
 @pytest.fixture
@@ -191,47 +193,17 @@ def test_environment_keeps_rows_and_columns(tmp_path):
     assert np.array_equal(read_radiance(tmp_path / "environment.exr"), bright)
 
 
-def save_run(run, **state):
-    """A run that was never trained: its surface is a sphere of radius 0.7 about the box's centre."""
-    torch.manual_seed(0)
-    config = Config().replace(
-        {"surface.n_levels": 4, "surface.log2_table_size": 10, "sampling.grid_resolution": 16, "export.resolution": 48}
-    )
-    run.mkdir()
-    model = SceneModel(config)
-    content = dict(
-        step=0,
-        seconds=0.0,
-        n_rays=64,
-        meshed_at=0.0,
-        previewed_at=0.0,
-        psnr_mean=None,
-        stopped=False,
-        exposures=torch.zeros(0, 4),
-        model=model.state_dict(),
-        optimiser={"state": {}},
-        device="cpu",
-        generator=torch.get_rng_state(),
-        torch_generator=torch.get_rng_state(),
-        occupancy=torch.zeros(16**3),
-        cells=torch.ones(16, 16, 16, dtype=torch.uint8),
-        environment=None,
-        light_noise=torch.zeros(2, dtype=torch.float64),
-        occlusion_light={},
-        mesh_vertices=None,
-        mesh_faces=None,
-        cameras=CAMERAS._asdict(),
-        **state,
-    )
-    save_checkpoint(run / "checkpoint.pt", config=config, fingerprint="", state=content)
-    return run
-
-
 @pytest.fixture
-def run(tmp_path):
-    box_from_world = torch.diag(torch.tensor([2.0, 2.0, 2.0, 1.0], dtype=torch.float64))
+def run(data, tmp_path):
+    """A run that was never trained: its surface is a sphere of radius 0.7 about the box's centre, in a world of its own."""
+    torch.manual_seed(0)
+    config = Config().replace({"n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "export.resolution": 48})
+    (tmp_path / "run").mkdir()
+    Training(load_dataset(data), config, tmp_path / "run", torch.device("cpu")).save()
+    path, box_from_world = tmp_path / "run/checkpoint.pt", torch.diag(torch.tensor([2.0, 2, 2, 1]).double())
     box_from_world[:3, 3] = torch.tensor([-2.0, 0.0, 4.0])
-    return save_run(tmp_path / "run", box_from_world=box_from_world)
+    torch.save(load_checkpoint(path) | {"box_from_world": box_from_world, "cameras": CAMERAS._asdict()}, path)
+    return path.parent
 
 
 def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
@@ -241,18 +213,9 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     line = capsys.readouterr().out.splitlines()[0]
     assert line.startswith("mesh: watertight, 1000 faces of ")
     assert line.endswith(", 0 floating or enclosed components dropped")
-    assert {p.name for p in out.iterdir()} == {
-        "mesh.glb",
-        "mesh.ply",
-        "mesh.obj",
-        "mesh.mtl",
-        "mesh_albedo.png",
-        "mesh_roughness.png",
-        "mesh_metallic.png",
-        "mesh_normal.png",
-        "environment.exr",
-        "environment.hdr",
-    }
+    files = "mesh.glb mesh.ply mesh.obj mesh.mtl environment.exr environment.hdr".split()
+    maps = [f"mesh_{name}.png" for name in ("albedo", "roughness", "metallic", "normal")]
+    assert {p.name for p in out.iterdir()} == {*files, *maps}
     full = trimesh.load(out / "mesh.ply", process=False)
     assert full.is_watertight and full.vertices.mean(axis=0) == pytest.approx([1, 0, -2], abs=0.05)
     document, arrays, _ = parse_glb(out / "mesh.glb")

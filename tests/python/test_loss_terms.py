@@ -12,17 +12,9 @@ from splitnerf.render.renderer import find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.losses import loss_terms
 
-SMALL = {
-    "n_levels": 4,
-    "log2_table_size": 10,
-    "grid_resolution": 16,
-    "constants.materials_width": 16,
-    "occlusion_width": 16,
-    "light_width": 16,
-    "light_samples": 64,
-    "light_queries": 32,
-    "min_step": 0.02,
-}
+SIZES = {"n_levels": 4, "log2_table_size": 10, "grid_resolution": 16, "min_step": 0.02}
+WIDTHS = {"constants.materials_width": 16, "occlusion_width": 16, "light_width": 16}
+SMALL = SIZES | WIDTHS | {"light_samples": 64, "light_queries": 32}
 
 
 @pytest.fixture(scope="module")
@@ -82,20 +74,9 @@ def test_nothing_but_the_papers_terms(rendered):
 
 # ---- all terms at once, each with a weight of its own ----
 
-WEIGHTS = {
-    "colour_weight": 0.11,
-    "eikonal_weight": 0.13,
-    "mask_weight": 0.17,
-    "light_weight": 0.19,
-    "neutral_weight": 0.23,
-    "light_prior_weight": 0.53,
-    "smoothness_weight": 0.29,
-    "entropy_weight": 0.31,
-    "metal_weight": 0.37,
-    "binary_metal_weight": 0.41,
-    "dark_metal_weight": 0.43,
-    "occlusion_weight": 0.47,
-}
+WEIGHTS = dict(colour_weight=0.11, eikonal_weight=0.13, mask_weight=0.17, light_weight=0.19, neutral_weight=0.23)
+WEIGHTS |= dict(smoothness_weight=0.29, entropy_weight=0.31, metal_weight=0.37, binary_metal_weight=0.41)
+WEIGHTS |= dict(dark_metal_weight=0.43, occlusion_weight=0.47, light_prior_weight=0.53)
 FIXED = {"light": 2.0, "neutral": 3.0, "entropy": 5.0, "occlusion": 7.0}
 
 

@@ -51,18 +51,10 @@ def report(ball, tmp_path_factory):
     terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
     summary = {"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}}
-    write_report(
-        folder / "report.html",
-        title="two </script> views",
-        summary=summary,
-        views=views,
-        lights=[],
-        light_truth=true,
-        light=sky(32),
-        history=history,
-        timings={"training": 3.0},
-        asset=folder / "mesh.glb",
-    )
+    lights = {"lights": [], "light_truth": true, "light": sky(32)}
+    times = {"history": history, "timings": {"training": 3.0}}
+    shown = {"summary": summary, "views": views, "asset": folder / "mesh.glb"}
+    write_report(folder / "report.html", title="two </script> views", **shown, **lights, **times)
     return folder / "report.html"
 
 

@@ -201,22 +201,10 @@ def recorded(monkeypatch, name: str, note: Callable, module=trainer) -> list:
 def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     """Levels, anneal, rates, and the terms that begin late or stand for several steps, as a run of 41 steps has them."""
     n = 41
-    config = tiny(
-        steps=n,
-        n_levels=8,
-        start_levels=2,
-        levels_open_by=0.6,
-        cos_anneal_by=0.5,
-        warmup_steps=8,
-        final_learning_rate=0.1,
-        light_step_every=4,
-        priors_from=0.5,
-        entropy_weight=0.01,
-        binary_metal_weight=0.01,
-        neutral_weight=0.03,
-        light_prior_weight=0.002,
-        mesh_every=0.25,
-    )
+    begun_late = {"entropy_weight": 0.01, "binary_metal_weight": 0.01, "priors_from": 0.5, "mesh_every": 0.25}
+    of_light = {"neutral_weight": 0.03, "light_prior_weight": 0.002, "light_step_every": 4}
+    levels = {"n_levels": 8, "start_levels": 2, "levels_open_by": 0.6, "cos_anneal_by": 0.5}
+    config = tiny(steps=n, warmup_steps=8, final_learning_rate=0.1, **levels, **begun_late, **of_light)
     levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active, step_module)
     anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5], step_module)
     rates = recorded(
