@@ -47,10 +47,10 @@ from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
 from splitnerf.run_folder import ORIGIN, check_run, clear_run, discard_refinement, is_refined, move_assets
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
-from splitnerf.training.loop import TrainedScene, Training, check_repeatable
+from splitnerf.training.loop import Training
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.observer import NOBODY, Event, Observer
-from splitnerf.training.schedule import progress_of
+from splitnerf.training.schedule import progress_by
 
 REPORT_VIEWS = 4
 VIEW_BUDGET = 1 << 20  # pixels of the test views that a run scores by path tracing at its end, REPORT_VIEWS views aside
@@ -81,13 +81,13 @@ def reconstruct(
     resume: bool = False,
     overwrite: bool = False,
     observer: Observer = NOBODY,
-) -> tuple[TrainedScene, dict | None]:
-    """Trains on a dataset, fills the run's folder and calls the observer. Returns the scene and, when finished, its
+) -> tuple[Training, dict | None]:
+    """Trains on a dataset, fills the run's folder and calls the observer. Returns the training and, when finished, its
     evaluation.
 
     Raises:
         InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
-        Diverged, EmptyMesh, OSError: See :func:`splitnerf.training.loop.train`.
+        Diverged, EmptyMesh, OSError: See :meth:`splitnerf.training.loop.Training.complete`.
     """
     check_repeatable(config, device)
     with locked(run):
@@ -97,14 +97,20 @@ def reconstruct(
         training = Training(dataset, config, run, torch.device(device), observer)
         training.begin(resume)
         begin_run(run, config, dataset, overwrite)
-        trained = training.complete()
-        if not trained.finished:
-            return trained, None
+        training.complete()
+        if not training.finished:
+            return training, None
         (run / EXPOSURES).unlink(missing_ok=True)
-        if trained.exposures is not None:
-            dataset = dataset.exposed(trained.exposures)
+        if (found := training.exposures.found) is not None:
+            dataset = dataset.exposed(found)
             write_exposures(run, dataset)
-        return trained, deliver(trained, dataset, test, run, resume=resume, observer=observer)
+        return training, deliver(training, dataset, test, run, resume=resume)
+
+
+def check_repeatable(config: Config, device: torch.device | str) -> None:
+    """Raises InputError where the settings ask for equal bits on a device whose sums have no fixed order."""
+    if config.run.deterministic and torch.device(device).type != "cpu":
+        raise InputError("a deterministic run needs the CPU, as a GPU adds in any order; leave out --device")
 
 
 def for_turntable(config: Config) -> Config:
@@ -148,15 +154,7 @@ def load_with_masks(
     return config, *load_splits(data, downscale, replace(reading, separated=folder))
 
 
-def deliver(
-    trained: TrainedScene,
-    dataset: Dataset,
-    test: Dataset | None,
-    run: Path,
-    *,
-    resume: bool,
-    observer: Observer = NOBODY,
-) -> dict | None:
+def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool) -> dict | None:
     """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
     Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
 
@@ -166,14 +164,14 @@ def deliver(
     Returns:
         The evaluation; None where the refinement was interrupted.
     """
-    config, timings, mesh, failure = trained.model.config, {"training": trained.seconds}, None, None
-    refines = config.refinement.enabled
-    if not (refines and resume and trained.n_new == 0 and (run / STATE).is_file()):
+    config, observer, timings = training.config, training.observer, {"training": training.seconds}
+    model, mesh, failure, refines = training.model, None, None, config.refinement.enabled
+    if not (refines and resume and training.step == training.resumed_at and (run / STATE).is_file()):
         observer(Event("export"))
         clock = time.monotonic()
         discard_refinement(run)
         try:
-            mesh = write_assets(run, trained.model, dataset.box_from_world, Cameras.of(dataset)).mesh
+            mesh = write_assets(run, model, dataset.box_from_world, Cameras.of(dataset)).mesh
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock
@@ -185,10 +183,10 @@ def deliver(
     if is_refined(run):
         n = max(REPORT_VIEWS, VIEW_BUDGET // (views.height * views.width))
         views = views.select(spread(range(len(views)), min(n, len(views))))
-    evaluated = score_run(run, trained.model, trained.grid, views, mesh, timings, {}, Protocol.spp)
+    evaluated = score_run(run, model, training.grid, views, mesh, timings, {}, Protocol.spp)
     write_json(run / "evaluation.json", evaluated.scores)
     timings["evaluation"] = time.monotonic() - clock
-    write_run_report(run, trained.model, evaluated, timings)
+    write_run_report(run, model, evaluated, timings)
     forget_state(run)
     if failure:
         raise failure
@@ -269,7 +267,7 @@ def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     config = config_of(content)
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
-    model.open_levels(progress_of(config, content["step"], content["seconds"]))
+    model.open_levels(progress_by(config)(content["step"], content["seconds"]))
     model.use_turns(content.get("light_turns"))
     SurfaceMesh(model).restore(content)
     grid = make_grid(config)

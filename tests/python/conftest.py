@@ -15,9 +15,9 @@ from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.refinement.texels import AssetTexels
-from splitnerf.training.loop import Training, train
+from splitnerf.training.loop import Training
 from splitnerf_tools.demo.scene import write_demo_dataset
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 from tiny_runs import train as command_train
 from viewer_server import numbered_sky, serving, triangle
 
@@ -69,7 +69,7 @@ def begun(data, tmp_path) -> tuple[Path, bytes]:
     """A run of 8 steps, and its checkpoint."""
     run = tmp_path / "run"
     run.mkdir()
-    train(load_dataset(data), tiny(steps=8), run)
+    train_scene(load_dataset(data), tiny(steps=8), run)
     return run, (run / "checkpoint.pt").read_bytes()
 
 

@@ -19,18 +19,17 @@ from splitnerf.data.tensor_files import LONGEST_PICKLE
 from splitnerf.errors import InputError
 from splitnerf.render.model import SceneModel
 from splitnerf.training import checkpoint
-from splitnerf.training import loop as trainer
 from splitnerf.training.checkpoint import load_checkpoint, restore_generator, restore_optimiser
 from splitnerf.training.schedule import make_optimiser
 from test_files import no_more_than
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 
 @pytest.fixture(scope="module")
 def written(data, tmp_path_factory) -> bytes:
     """The checkpoint of a run of 2 steps with the seed 5."""
     run = tmp_path_factory.mktemp("written")
-    trainer.train(load_dataset(data), tiny(steps=2, seed=5), run)
+    train_scene(load_dataset(data), tiny(steps=2, seed=5), run)
     return (run / "checkpoint.pt").read_bytes()
 
 
@@ -361,7 +360,7 @@ def test_a_checkpoint_that_does_not_fit_is_refused(data, content, tmp_path, case
     with pytest.raises(
         InputError, match="checkpoint.pt: its .* (does not fit the settings|cannot be restored)"
     ) as caught:
-        trainer.train(load_dataset(data), tiny(steps=4, **settings), tmp_path, resume=True)
+        train_scene(load_dataset(data), tiny(steps=4, **settings), tmp_path, resume=True)
     assert len(str(caught.value).splitlines()) == 1
     torch.set_rng_state(before)
 

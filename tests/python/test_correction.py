@@ -169,7 +169,7 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     batch = Batch(*rays, *pixels, jitter, jitter, *photo, probes)
     gradients = []
     for _ in range(2):
-        ray, _ = step.gradients(batch, model.evaluate_light(), None, 1, 0.0)
+        ray, _ = step.gradients(batch, model.evaluate_light(), 1, 0.0)
         gradients.append(model.sdf_field.hidden_direction.grad.clone())
     torch.testing.assert_close(*gradients)
     n = len(ray.weights)
@@ -180,7 +180,7 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     for seed in range(2):
         torch.manual_seed(seed)
         step = Step(model, grid, SurfaceMesh(model), generator(3))
-        entropies.append(step.gradients(batch, model.evaluate_light(), None, 1, 0.9)[1]["entropy"].value.item())
+        entropies.append(step.gradients(batch, model.evaluate_light(), 1, 0.9)[1]["entropy"].value.item())
     assert entropies[0] == entropies[1] > 0
 
 

@@ -22,7 +22,7 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Capacity
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 
 def test_two_devices_in_one_call_are_told(monkeypatch):
@@ -105,7 +105,7 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
         **settings,
     )
     with pretend_gpu(monkeypatch) as gpu:
-        trained = trainer.train(load_dataset(data), config, tmp_path, device="cuda")
+        trained = train_scene(load_dataset(data), config, tmp_path, device="cuda")
         assert trained.finished and trained.model.device == GPU and trained.grid.cells.device == GPU
     assert all(isinstance(p, GpuTensor) for p in trained.model.parameters())
     (before, no_mesh), (after, made_at) = seen[40], seen[240]
@@ -153,13 +153,13 @@ def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
 def test_padding_is_computed_only_where_it_saves_a_wait(data, tmp_path, monkeypatch, name, pads):
     asked, differentiate = [], GpuStep.differentiate
 
-    def watched(taken, batch, found, light, environment, step, progress, capacity):
+    def watched(taken, batch, found, light, step, progress, capacity):
         asked.append((len(found.directions) > found.n_found.item(), capacity is not None, taken.capacity == Capacity()))
-        return differentiate(taken, batch, found, light, environment, step, progress, capacity)
+        return differentiate(taken, batch, found, light, step, progress, capacity)
 
     monkeypatch.setattr(GpuStep, "differentiate", watched)
     with pretend_gpu(monkeypatch):
-        trainer.train(
+        train_scene(
             load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda"
         )
     assert asked[0] == (False, False, True) and set(asked[4:]) == {(pads, pads, not pads)}
@@ -198,7 +198,7 @@ def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
     try:
         torch.set_num_threads(8)
         with pretend_gpu(monkeypatch):
-            trainer.train(load_dataset(data), tiny(steps=2), tmp_path, device=device)
+            train_scene(load_dataset(data), tiny(steps=2), tmp_path, device=device)
         assert seen == {threads} and torch.get_num_threads() == 8
     finally:
         torch.set_num_threads(before)
@@ -208,13 +208,13 @@ def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
 def test_runs_go_on_on_the_other_device_and_back(data, tmp_path, monkeypatch, settings):
     dataset = load_dataset(data)
     config = tiny("cpu", occlusion_directions=256, open_below=0.0, **settings)
-    trainer.train(dataset, config.replace({"steps": 12}), tmp_path)
+    train_scene(dataset, config.replace({"steps": 12}), tmp_path)
     with pretend_gpu(monkeypatch):
-        there = trainer.train(dataset, config.replace({"steps": 24}), tmp_path, device="cuda", resume=True)
+        there = train_scene(dataset, config.replace({"steps": 24}), tmp_path, device="cuda", resume=True)
         assert there.model.bits.cache.bits.device == GPU and there.step == 24
     content = load_checkpoint(tmp_path / "checkpoint.pt")
     assert content["device"] == "cuda" and not any(isinstance(x, GpuTensor) for x in content["model"].values())
-    back = trainer.train(dataset, config.replace({"steps": 36}), tmp_path, resume=True)
+    back = train_scene(dataset, config.replace({"steps": 36}), tmp_path, resume=True)
     steps = [json.loads(line)["step"] for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     assert back.finished and back.step == 36 and steps == sorted(set(steps))
     psnr = [json.loads(line)["psnr"] for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]

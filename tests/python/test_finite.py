@@ -15,13 +15,13 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged, check_state, explain_loss
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.step import Capacity, Step, StepNumbers
-from tiny_runs import lines_of, tiny, train
+from tiny_runs import lines_of, tiny, train, train_scene
 
 
 def goes_on(data: Path, run: Path, before: bytes) -> None:
     """The checkpoint is the one from before, and the run goes on from it."""
     assert (run / "checkpoint.pt").read_bytes() == before
-    trainer.train(load_dataset(data), tiny(steps=12), run, resume=True)
+    train_scene(load_dataset(data), tiny(steps=12), run, resume=True)
     assert load_checkpoint(run / "checkpoint.pt")["step"] == 12
 
 
@@ -43,7 +43,7 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
         with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
-            trainer.train(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
+            train_scene(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
     goes_on(data, run, before)
 
 
@@ -61,7 +61,7 @@ def test_a_light_texel_that_is_not_finite_stops_the_run(data, begun, monkeypatch
     with monkeypatch.context() as patch:
         patch.setattr(trainer, "set_learning_rate", planting)
         with pytest.raises(Diverged, match=r"not finite: parameter light.texels \(1 of"):
-            trainer.train(load_dataset(data), tiny(steps=20), run, resume=True)
+            train_scene(load_dataset(data), tiny(steps=20), run, resume=True)
     goes_on(data, run, before)
 
 
@@ -91,7 +91,7 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
 
     monkeypatch.setattr(kind, "fetch", planting)
     monkeypatch.setattr(trainer.Training, "advance", watched)
-    trained = trainer.train(load_dataset(data), tiny(steps=8), tmp_path)
+    trained = train_scene(load_dataset(data), tiny(steps=8), tmp_path)
     assert [i for i, any_moved in enumerate(moved) if not any_moved] == [3, 5, 6]
     assert all(p.isfinite().all() for p in trained.model.parameters())
     assert [line["skipped"] for line in lines_of(tmp_path)] == [0, 0, 0, 1, 1, 2, 3, 3]

@@ -84,12 +84,11 @@ def doubled(x: object) -> object:
 
 
 class Work(NamedTuple):
-    """What all sides are given: the number of the step, its rays and samples on the CPU, and the light that weighs occlusion."""
+    """What all sides are given: the number of the step, its rays and its samples, on the CPU."""
 
     step: int
     batch: Batch
     found: FoundSamples
-    environment: Tensor | None
 
 
 class Answer(NamedTuple):
@@ -126,7 +125,7 @@ def drawn_work(training: Training) -> Work:
     """A batch, its samples, and the first step from now on at which the light moves."""
     batch = draw_batch(training.source, training.n_rays, training.config, training.exposures.factors)
     step = next(i for i in range(training.step, training.step + 1000) if light_moves(training.config, i))
-    return Work(step, batch, training.take_step.find(batch, PROGRESS), training.environment)
+    return Work(step, batch, training.take_step.find(batch, PROGRESS))
 
 
 def on(device: torch.device, value: object) -> object:
@@ -138,12 +137,12 @@ def answer(training: Training, work: Work, draws: SameDraws, tf32: bool = False)
     """One step with these rays, samples and draws, in the precision of the training's model."""
     model = training.model
     is_double = model.variance.dtype == torch.float64
-    batch, found, environment = on(model.device, work[1:])
+    batch, found = on(model.device, work[1:])
     if is_double:
         batch, found = tree_map(doubled, (batch, found))
     with draws.again(), tensor_cores(tf32), Doubles() if is_double else nullcontext():
         light = model.evaluate_light()
-        ray, terms = training.take_step.differentiate(batch, found, light, environment, work.step, PROGRESS)
+        ray, terms = training.take_step.differentiate(batch, found, light, work.step, PROGRESS)
         light.backward()
     return collected(training, ray, terms)
 
@@ -275,7 +274,7 @@ class Graphed:
         training.generator.manual_seed(1)
         training.optimiser.zero_grad(set_to_none=True)
         light = training.model.evaluate_light()
-        ray, terms = step.gradients(batch or self.batch, light, None, self.work.step, PROGRESS)
+        ray, terms = step.gradients(batch or self.batch, light, self.work.step, PROGRESS)
         light.backward()
         pending = step.fetch(1, batch or self.batch, ray, terms)
         step.last, allowed = pending.read(), bool(pending.allowed)

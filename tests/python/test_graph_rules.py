@@ -52,7 +52,7 @@ class Fake(GpuStep):
         )
         return self.given[1]
 
-    def differentiate(self, batch, found, light, environment, step, progress, capacity):
+    def differentiate(self, batch, found, light, step, progress, capacity):
         self.calls.append(capacity)
         self.model.zero_grad(set_to_none=True)
         looked_up = light(*LOOKUP).sum() + (light.cells.radiance * light.cells.solid_angles[:, None]).mean()
@@ -80,7 +80,7 @@ class Fake(GpuStep):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
-        result = self.gradients(Rays(torch.full((n_rays, 3), target)), light, None, step, progress)
+        result = self.gradients(Rays(torch.full((n_rays, 3), target)), light, step, progress)
         is_new = any(all(graph is not other for other in known) for graph in self._graphs.values())
         how = "recorded" if is_new else "called" if len(self.calls) > before else "repeated"
         complete = self.counted(*counts) if counts else None
@@ -244,7 +244,7 @@ def test_a_repeated_step_is_that_of_its_own_inputs(step):
             repeated = step.taken(light=light, target=0.3 * k + number)
             assert repeated.how == "repeated"
             found, own = gradients(step), model.variance.grad
-            called = step.differentiate(*step.given, again, None, 0, 0.0, None)
+            called = step.differentiate(*step.given, again, 0, 0.0, None)
             assert repeated.value == pytest.approx(called[0].item(), rel=1e-6)
             for a, b in zip(found, gradients(step), strict=True):
                 assert (a is None and b is None) or torch.equal(a, b)

@@ -12,7 +12,7 @@ from pretend_gpu import pretend_gpu
 from splitnerf.data.dataset import load_dataset
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
-from splitnerf.training import gpu_step
+from splitnerf.training import gpu_step, start
 from splitnerf.training import loop as trainer
 from splitnerf.training.batches import PixelSource, draw_batch
 from splitnerf.training.checkpoint import load_checkpoint
@@ -20,7 +20,7 @@ from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
 from test_start import shape_of_ball
-from tiny_runs import lines_of, tiny
+from tiny_runs import lines_of, tiny, train_scene
 
 
 @pytest.fixture
@@ -56,11 +56,11 @@ def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, rec
     for name in ("recorded", "called"):
         (tmp_path / name).mkdir()
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
-    trainer.train(load_dataset(data), config, tmp_path / "recorded")
+    train_scene(load_dataset(data), config, tmp_path / "recorded")
     assert recording["replayed"] > 60 and recording["recorded"] < 60
     in_place = []
     monkeypatch.setattr(gpu_step, "record", lambda *arguments: in_place.append(called(*arguments)) or in_place[-1])
-    trainer.train(load_dataset(data), config, tmp_path / "called")
+    train_scene(load_dataset(data), config, tmp_path / "called")
     assert len(in_place) == recording["recorded"]
     same_lines(tmp_path)
 
@@ -76,7 +76,7 @@ class Taken(NamedTuple):
     made_at: float
 
 
-def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer.TrainedScene, list[Taken]]:
+def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer.Training, list[Taken]]:
     """The schedule of preset fast in 160 steps on a pretended GPU. Before step 57 the surface becomes so blurred that rays find a half
     more samples. Memory that a mesh leaves when the next comes is overwritten."""
     advance, poll, use = trainer.Training.advance, SurfaceMesh.poll, SceneModel.use_mesh
@@ -117,7 +117,7 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         )
         run.mkdir()
         with pretend_gpu(patch):
-            return trainer.train(load_dataset(data), config, run, device="cuda"), steps
+            return train_scene(load_dataset(data), config, run, device="cuda"), steps
 
 
 def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(data, tmp_path, monkeypatch, recording):
@@ -125,7 +125,7 @@ def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(da
         shape = shape_of_ball(16)
         return type(shape)(shape.distance.to(hull.device), shape.trust.to(hull.device), shape.box)
 
-    monkeypatch.setattr(trainer, "start_shape", ball)  # the tiny photos are too few
+    monkeypatch.setattr(start, "start_shape", ball)  # the tiny photos are too few
     runs = []
     for name in ("recorded", "called"):
         runs.append(schedule_of_a_gpu(data, tmp_path / name, monkeypatch, recording, **{"surface.start": "stereo"})[0])
@@ -191,7 +191,7 @@ def test_a_capacity_changes_roundings_alone(data):
     def step(found, capacity):
         take_step.generator = torch.Generator().manual_seed(1)
         light = model.evaluate_light()
-        ray, terms = take_step.differentiate(batch, found, light, None, 3, 0.9, capacity)
+        ray, terms = take_step.differentiate(batch, found, light, 3, 0.9, capacity)
         light.backward()
         return {k: t.value.detach() for k, t in terms.items()}, [p.grad for p in model.parameters()], ray
 
@@ -222,7 +222,7 @@ def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch,
     monkeypatch.setattr(AdamW, "step", watched)
     monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
     config = tiny("cpu", steps=40, cuda_graphs=True, target_samples=4608)
-    trained = trainer.train(load_dataset(data), config, tmp_path)
+    trained = train_scene(load_dataset(data), config, tmp_path)
     assert complete.count(False) > 0 and moved == complete and trained.finished
     stored = load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"]
     assert max(int(moments["step"]) for moments in stored.values()) == complete.count(True)

@@ -21,9 +21,8 @@ from splitnerf.data.images import write_image
 from splitnerf.evaluate.scoring import read_evaluation
 from splitnerf.export.scene import write_assets
 from splitnerf.render.seen import Cameras
-from splitnerf.training.loop import train
 from splitnerf_tools.demo.scene import build_environment
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 CENTRE, RADIUS = np.array([0.9, -0.6, 0.4]), 0.8
 RED, BLUE = np.array([0.65, 0.12, 0.08]), np.array([0.08, 0.15, 0.6])  # linear albedo, along and against TO_RED
@@ -110,7 +109,7 @@ def result(tmp_path_factory) -> Result:
         mesh_every=0.5,
     )
     dataset = load_dataset(root)
-    trained = train(dataset, config, root)
+    trained = train_scene(dataset, config, root)
     write_assets(root, trained.model, dataset.box_from_world, Cameras.of(dataset))
     mesh = trimesh.load(root / "mesh.glb", process=False).to_geometry()
     texture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB"), np.float64) / 255
@@ -183,7 +182,7 @@ def test_the_floor_of_a_bowl_stands_where_it_is(tmp_path):
     photos = load_dataset(data, "train")
     config = preset("cpu").replace({"run.steps": 250, "run.preview_every": 1.0})
     (run := tmp_path / "run").mkdir()
-    trained = train(photos, config, run)
+    trained = train_scene(photos, config, run)
     truth = trimesh.load(data / "mesh.ply", force="mesh").apply_transform(np.asarray(photos.box_from_world))
     floor, rim = first_surface(truth), truth.bounds[1, 2]
     heights = torch.linspace(1.4, -1.4, 1401)

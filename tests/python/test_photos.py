@@ -25,7 +25,7 @@ from splitnerf.training import loop
 from splitnerf.training.batches import PixelSource, averaging_factor, pixel_list, reduced, runs_of, training_photos
 from test_known_pixels import ignoring_scene
 from test_pixels import scene
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 CPU = torch.device("cpu")
 
@@ -61,7 +61,7 @@ def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
         dataset = load_dataset(root, "train", 1, how)
         run = tmp_path / f"run{len(found)}"
         run.mkdir()
-        state = loop.train(dataset, tiny(steps=5, deterministic=True), run).model.state_dict()
+        state = train_scene(dataset, tiny(steps=5, deterministic=True), run).model.state_dict()
         found.append((dataset, state))
     (memory, first), (file, second) = found
     assert file_of(memory.images.codes) is None and file_of(file.images.codes) is not None

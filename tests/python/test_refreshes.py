@@ -12,7 +12,7 @@ import torch
 from splitnerf.data.dataset import load_dataset
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
-from splitnerf.pipeline import load_run
+from splitnerf.pipeline import check_repeatable, load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes
@@ -20,10 +20,10 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.metrics import StepLog
-from splitnerf.training.schedule import next_ray_count
+from splitnerf.training.schedule import next_ray_count, progress_by
 from splitnerf.training.step import Capacity, StepNumbers
 from test_train import flat, same
-from tiny_runs import lines_of, tiny
+from tiny_runs import lines_of, tiny, train_scene
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
 
@@ -63,7 +63,7 @@ def refreshed(data, tmp_path, monkeypatch):
             "backward": calls(monkeypatch, EvaluatedLight, "backward", lambda *_: at[0]),
         }
         config = tiny(steps=20, **PLAIN, **settings)
-        return loop.train(load_dataset(data), config, tmp_path), seen
+        return train_scene(load_dataset(data), config, tmp_path), seen
 
     return run
 
@@ -83,9 +83,9 @@ def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypat
     light = calls(monkeypatch, SceneModel, "weigh_occlusion", lambda *_: at[0])
     indirect = calls(monkeypatch, SceneModel, "refresh_indirect", lambda *_: at[0])
     config = tiny(steps=20, mesh_every=0.5, indirect_every=7, preview_every=2.0, open_below=0.0, levels_open_by=0.0)
-    trained = loop.train(load_dataset(data), config, tmp_path)
+    trained = train_scene(load_dataset(data), config, tmp_path)
     assert light == [10, 16, 19] and indirect == [10] * 3 + [14] + [19] * 3
-    assert trained.model.has_mesh and trained.scene is not None and trained.finished
+    assert trained.model.has_mesh and trained.mesh.scene is not None and trained.finished
 
 
 def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkeypatch):
@@ -107,8 +107,8 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
         **{"occlusion.kind": "mlp", "shading.method": "split", "constants.occlusion_environment_height": 12},
         occlusion_rays=4,
     )
-    loop.train(load_dataset(data), config, tmp_path)
-    assert heights == [(4, 12), (16, 12)] and training["it"].environment.shape == (12, 24, 3)
+    train_scene(load_dataset(data), config, tmp_path)
+    assert heights == [(4, 12), (16, 12)] and training["it"].mesh.environment.shape == (12, 24, 3)
 
 
 def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
@@ -125,7 +125,7 @@ def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
 def test_a_line_of_the_log_holds_the_weighted_terms(data, tmp_path):
     """They add up to the loss; psnr follows the mean squared error of colours by a twentieth a step."""
     config = tiny(steps=5, colour_weight=7.0, neutral_weight=0.0, **PLAIN)
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     lines = lines_of(tmp_path)
     assert [line["step"] for line in lines] == [1, 2, 3, 4, 5]
     for line in lines:
@@ -147,14 +147,14 @@ def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeyp
     save = loop.Training.save
     monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
     config = tiny(steps=20, checkpoint_minutes=1e-9, light_step_every=8, **PLAIN | {"preview_every": 0.25})
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     assert previews == [5, 10, 15, 20] and saved == [8, 16, 20]
 
 
 def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
     """The samples composited, not those shaded or looked at."""
     config = tiny(steps=20, target_samples=3000, initial_rays=64, max_rays=400, **PLAIN)
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     lines = lines_of(tmp_path)
     rays = [line["rays"] for line in lines]
     samples = [line["kept"] * line["samples_per_ray"] * line["rays"] for line in lines]
@@ -207,10 +207,10 @@ def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, mon
     save = loop.Training.save
     monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
     config = tiny(steps=16, checkpoint_minutes=1.0, light_step_every=1, **PLAIN)
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     assert saved == [7, 14, 16]
     pause[0] = 5000.0
-    trained = loop.train(load_dataset(data), config.replace({"steps": 20}), tmp_path, resume=True)
+    trained = train_scene(load_dataset(data), config.replace({"steps": 20}), tmp_path, resume=True)
     lines = lines_of(tmp_path)
     assert [line["step"] for line in lines] == [*range(1, 21)] and trained.step == 20
     assert [line["seconds"] for line in lines] == [*range(10, 201, 10)] and trained.seconds == 200
@@ -228,8 +228,7 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
     refined = tiny(steps=100, max_minutes=2.0, **{"refinement.enabled": True}, refinement_share=0.4)
     assert refined.training_minutes + refined.refinement_minutes == 2.0
     for config, share in ((refined, seconds / 72), (tiny(steps=100), 0.0)):
-        training.config = config
-        assert training.progress == pytest.approx(min(1.0, max(step / 100, share)))
+        assert progress_by(config)(step, float(seconds)) == pytest.approx(min(1.0, max(step / 100, share)))
 
 
 def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
@@ -242,8 +241,8 @@ def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
 def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path):
     """Half of its levels are open, as they were: the mesh is that of the same field."""
     config = tiny(steps=8, start_levels=1, levels_open_by=2.0, learning_rate=0.05, warmup_steps=1, mesh_every=2.0)
-    first = loop.train(load_dataset(data), config, tmp_path).model
-    again = loop.train(load_dataset(data), config, tmp_path, resume=True)
+    first = train_scene(load_dataset(data), config, tmp_path).model
+    again = train_scene(load_dataset(data), config, tmp_path, resume=True)
     assert again.step == 8 and again.finished
     x = torch.rand(100, 3) - 0.5
     for model in (again.model, load_run(tmp_path)[0]):
@@ -260,11 +259,11 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
         tiny(steps=8, mesh_every=2.0, preview_every=2.0, open_below=0.0, levels_open_by=0.0),
     )
     finished = calls(monkeypatch, loop.Training, "finish", lambda self: self)
-    loop.train(dataset, config, tmp_path)
+    train_scene(dataset, config, tmp_path)
     one, other = finished[0], loop.Training(dataset, config.replace({"seed": 8}), tmp_path, torch.device("cpu"))
     one.model.light.loss_samples.restore([0.25, 0.5])
     one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
-    one.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
+    one.mesh.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
     cached = one.model.bits.state()
     other_light = {name: torch.rand_like(cached[name]) for name in ("sky", "sent") if cached[name] is not None}
     one.model.bits.restore(cached | other_light)
@@ -272,7 +271,7 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     kept = load_checkpoint(tmp_path / "checkpoint.pt")
     torch.manual_seed(9)
     other.restore()
-    assert not other.first
+    assert other.step > 0
     other.save()
     again, before = flat(load_checkpoint(tmp_path / "checkpoint.pt")), flat(kept)
     assert again.keys() == before.keys()
@@ -295,7 +294,7 @@ def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch
 
     monkeypatch.setattr(meshes, "make_mesh", slowly)
     config = tiny(steps=12, mesh_every=0.5, preview_every=2.0, **{"mesh.background": True}, deterministic=deterministic)
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     assert threading.main_thread() not in makers and len(makers) == 2
     assert (used[0] == 6) == deterministic and used[-1] == 11
 
@@ -309,7 +308,7 @@ def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch
     ],
 )
 def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, settings):
-    loop.train(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
+    train_scene(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
     assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
 
 
@@ -320,7 +319,7 @@ def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, o
     config = tiny(
         steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": occlusion, "shading.method": "split"}
     )
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     assert requests == asked
 
 
@@ -339,16 +338,16 @@ def test_parameters_are_checked_before_a_mesh_and_before_they_are_saved(data, tm
 def test_a_run_repeats_its_bits_as_it_is_set(data, tmp_path, monkeypatch, on):
     order = calls(monkeypatch, loop.Training, "advance", lambda *_: torch.are_deterministic_algorithms_enabled())
     config = tiny(steps=2, deterministic=on, **PLAIN)
-    loop.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
     assert order == [on, on]
 
 
 def test_bits_repeat_on_the_cpu_alone(data, tmp_path):
     """Others are refused before anything is made."""
-    loop.check_repeatable(tiny(deterministic=True), "cpu")
-    loop.check_repeatable(tiny(), "cuda")
+    check_repeatable(tiny(deterministic=True), "cpu")
+    check_repeatable(tiny(), "cuda")
     with pytest.raises(InputError, match="deterministic run needs the CPU"):
-        loop.train(load_dataset(data), tiny(deterministic=True), tmp_path, device="cuda")
+        check_repeatable(tiny(deterministic=True), "cuda")
 
 
 def test_rays_are_drawn_near_the_masks_as_often_as_is_set(data, tmp_path):

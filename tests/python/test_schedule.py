@@ -22,7 +22,7 @@ from splitnerf.training.schedule import (
     next_ray_count,
     set_learning_rate,
 )
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 
 def one_parameter(rate: float = 1.0) -> torch.optim.Optimizer:
@@ -215,7 +215,7 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     monkeypatch.setattr(
         SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)
     )
-    trainer.train(load_dataset(data), config, tmp_path)
+    train_scene(load_dataset(data), config, tmp_path)
 
     assert levels == [min(8, 2 + math.floor(6 * step / (0.6 * n))) for step in range(n)]
     assert anneals == pytest.approx([min(1.0, step / (0.5 * n)) for step in range(n)])

@@ -14,11 +14,11 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
-from splitnerf.training import loop, start
-from splitnerf.training.loop import Training, train
+from splitnerf.training import start
+from splitnerf.training.loop import Training
 from splitnerf.training.start import CLEAR_SHARE, MARGIN, StartShape, exact_distances, fit_to, surface_depths
 from splitnerf_tools.synth.orbits import spiral
-from tiny_runs import tiny
+from tiny_runs import tiny, train_scene
 
 SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48
 
@@ -260,12 +260,12 @@ def test_a_field_takes_a_shape():
 
 
 def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
-    monkeypatch.setattr(loop, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
+    monkeypatch.setattr(start, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
     settings = {"surface.start": "stereo", "deterministic": True, "steps": 100}
     whole, part = tmp_path / "whole", tmp_path / "part"
     for run in (whole, part):
         run.mkdir()
-    expected = train(load_dataset(data), tiny(**settings), whole)
+    expected = train_scene(load_dataset(data), tiny(**settings), whole)
     config = tiny(**settings)
     training = Training(load_dataset(data), config, part, torch.device("cpu"))
     training.begin()
@@ -274,6 +274,6 @@ def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
         training.refresh()
         training.advance(None)
     training.save()
-    resumed = train(load_dataset(data), config, part, resume=True)
+    resumed = train_scene(load_dataset(data), config, part, resume=True)
     for ours, theirs in zip(resumed.model.parameters(), expected.model.parameters()):
         assert torch.equal(ours, theirs)

@@ -24,7 +24,7 @@ from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
 from test_files import held
 from test_train import flat, same
-from tiny_runs import SMALL, as_options, command, contents, lines_of, tiny, train
+from tiny_runs import SMALL, as_options, command, contents, lines_of, tiny, train, train_scene
 from tqdm import tqdm
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
@@ -55,9 +55,9 @@ def test_a_signal_ends_a_preview(data, tmp_path, monkeypatch):
 
     monkeypatch.setattr(loop, "write_preview", preview)
     config = tiny(steps=8, preview_every=0.25)
-    assert not loop.train(load_dataset(data), config, tmp_path).finished
+    assert not train_scene(load_dataset(data), config, tmp_path).finished
     assert begun == [2] and load_checkpoint(tmp_path / "checkpoint.pt")["step"] == 4
-    assert loop.train(load_dataset(data), config, tmp_path, resume=True).finished
+    assert train_scene(load_dataset(data), config, tmp_path, resume=True).finished
     assert begun == [2, 4, 6, 8]
 
 

@@ -21,10 +21,9 @@ from splitnerf.refinement.refine import STATE
 from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
-from splitnerf.training.loop import train as train_scene
 from splitnerf.training.observer import NOBODY, Observer, Request, together
 from splitnerf.training.schedule import light_period
-from tiny_runs import SMALL, as_options, contents, lines_of, tiny, train
+from tiny_runs import SMALL, as_options, contents, lines_of, tiny, train, train_scene
 
 
 def test_a_run_holds_every_file_and_evaluate_repeats_its_scores(data_with_mesh, tmp_path, capsys):
@@ -224,7 +223,9 @@ class Asking:
 
 def trained(data, run, config: Config, observer: Observer = NOBODY):
     run.mkdir(exist_ok=True)
-    return Training(load_dataset(data), config, run, CPU, observer).complete()
+    training = Training(load_dataset(data), config, run, CPU, observer)
+    training.complete()
+    return training
 
 
 def test_observers_learn_of_all_that_happens(data, tmp_path):
@@ -301,8 +302,8 @@ def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
         (tmp_path / STATE).write_bytes(b"")
     training = Training(load_dataset(data), config, tmp_path, CPU)
     training.restore()
-    scene = training.complete()
-    assert scene.finished and (scene.step, scene.n_new) == ((20, 0) if stage_begun else (40, 20))
+    training.complete()
+    assert training.finished and (training.step, training.resumed_at) == (20 if stage_begun else 40, 20)
 
 
 def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
@@ -324,11 +325,14 @@ def test_the_time_of_a_pause_is_told(monkeypatch):
         observer=Asking(0, Request.PAUSE, Request.PAUSE, Request.SAVE, Request.PAUSE),
         stopped=False,
         step=1,
+        started=5.0,
         settle=lambda: done.append("settle"),
         save=lambda: done.append("save"),
     )
+    skipped = []
     with Interrupt() as interrupt:
-        assert Training.fulfil_requests(training, interrupt) == pytest.approx(3 * loop.PAUSE)
+        Training.fulfil_requests(training, interrupt, SimpleNamespace(skip=skipped.append))
+    assert sum(skipped) == pytest.approx(3 * loop.PAUSE) and training.started == pytest.approx(5.0 + sum(skipped))
     assert done == ["settle", "settle", "settle", "save", "settle"]
 
 

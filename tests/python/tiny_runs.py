@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import torch
 from splitnerf.cli import main
 from splitnerf.config import Config, preset
+from splitnerf.data.dataset import Dataset
+from splitnerf.training.loop import Training
 
 # A tenth of the default sizes and less; the method is that of the preset.
 SMALL = dict(
@@ -47,6 +50,14 @@ def command(*words: object) -> int:
 def train(data: Path, run: Path, *options: str) -> int:
     """`splitnerf train` with small settings; returns its exit code."""
     return main(["train", str(data), "--out", str(run), *as_options(SMALL), *options])
+
+
+def train_scene(dataset: Dataset, config: Config, run: Path, *, device: str = "cpu", resume: bool = False) -> Training:
+    """A training after its last step, in the folder `run`."""
+    training = Training(dataset, config, run, torch.device(device))
+    training.begin(resume)
+    training.complete()
+    return training
 
 
 def contents(folder: Path) -> dict[Path, bytes]:

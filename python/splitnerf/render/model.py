@@ -113,6 +113,8 @@ class SceneModel(nn.Module):
         occlusion: The network of occlusion factors; None where they are cached, or there are none.
         cells: The cells of the sky towards which visibility is cached; None where it is not.
         bits: The cached visibility of the newest mesh; None before the first one.
+        turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`; None: it
+            stands still.
         has_mesh: Whether there was a mesh yet. Before, and without occlusion, all factors are 1.
     """
 
@@ -144,6 +146,7 @@ class SceneModel(nn.Module):
         self.cells = SkyCells(c.occlusion_directions) if kind == "bits" else None
         self.bits: VisibilityBits | None = None
         self.has_mesh = False
+        self.turns: Tensor | None = None
         self.light = make_light(config)
         self.variance = nn.Parameter(torch.tensor(config.constants.initial_variance))
 
@@ -337,8 +340,9 @@ class SceneModel(nn.Module):
         )
 
     def use_turns(self, turns: Tensor | None) -> None:
-        """Averages the light of the cached occlusion over some of the photos' rotations [views, 3, 3] of it; None: it stands
-        still."""
+        """Sets the rotations [views, 3, 3] of the photos' light; None: it stands still. That of the cached occlusion is
+        averaged over some of them."""
+        self.turns = turns
         if self.cells is not None and turns is not None:
             self.cells.turns = turns[torch.linspace(0, len(turns) - 1, min(len(turns), TURNS)).long()]
 

@@ -18,7 +18,7 @@ from splitnerf.data.lens import pixel_width
 from splitnerf.data.pixels import Photos, ask_for, at_unit_exposure, averaged_codes, decoded, file_of
 from splitnerf.memory import give_back
 from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
-from splitnerf.render.occupancy import widened
+from splitnerf.render.occupancy import visual_hull, widened
 from splitnerf.render.rays import pixel_matrix
 from splitnerf.render.renderer import ProbePoints
 
@@ -270,7 +270,7 @@ class PixelSource:
         turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`, or None.
         foreground, known: The valid pixels near a mask, and all valid pixels.
         possible: [n, h, w] bool, where the photos may show the object: within the masks, and at invalid pixels. Those
-            of large photos are smaller by `hull_factor`, a pixel being true where one within it is.
+            of large photos are smaller, a pixel being true where one within it is.
     """
 
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0):
@@ -282,7 +282,7 @@ class PixelSource:
         self.height, self.width = dataset.height, dataset.width
         self.share, self.generator = foreground_share, generator
         near, known, possible, edges = [], [], [], []
-        self.hull_factor = max(1, min(self.height, self.width) // HULL_EDGE)
+        self._factor = max(1, min(self.height, self.width) // HULL_EDGE)
         for i in range(len(dataset)):
             alpha, known_here = dataset.images[i, ..., 3], None
             mask = torch.from_numpy(alpha > 0)
@@ -295,7 +295,7 @@ class PixelSource:
                 known_here = None if known_here is None else known_here.numpy()
                 edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels))
             near.append(runs_of(wide))
-            possible.append(reduced(seen, self.hull_factor))
+            possible.append(reduced(seen, self._factor))
             del alpha, mask, wide, seen, known_here
             # else a photo's arrays, large ones, leave gaps between the runs that stay: 13 MB at 12 megapixels
             give_back()
@@ -307,6 +307,11 @@ class PixelSource:
         has_edges = any(len(behind) for _, behind in edges)
         self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
         self._no_edges = EdgeRuns.none(self.device)
+
+    def hull(self, config: Config) -> Tensor:
+        """[r, r, r] bool, the cells of the occupancy grid within the masks' visual hull."""
+        lenses = self.intrinsics / self._factor
+        return visual_hull(config.sampling.grid_resolution, config.constants.box, self.possible, self.poses, lenses)
 
     def draw(
         self, n: int, random: Tensor | None = None, backgrounds: Tensor | None = None, exposures: Tensor | None = None

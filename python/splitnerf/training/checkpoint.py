@@ -43,12 +43,11 @@ def save(training: Any) -> None:
         torch_generator=torch.get_rng_state(),
         occupancy=t.grid.values,
         cells=t.grid.cells,
-        environment=t.environment,
         light_noise=t.model.light.loss_samples.state(),
         box_from_world=torch.from_numpy(t.dataset.box_from_world),
         start=None if start is None else start.state(),
         cameras=Cameras.of(t.dataset)._asdict(),
-        light_turns=t.source.turns,
+        light_turns=t.model.turns,
         **t.mesh.state(),
     )
     save_checkpoint(t.run / "checkpoint.pt", config=t.config, fingerprint=t.fingerprint, state=state)
@@ -68,8 +67,6 @@ def restore(training: Any) -> None:
     restore_generator(t.generator, content, path)
     t.grid.values, t.grid.cells = restored_grid(t.grid, content, path)
     t.model.light.loss_samples.restore(content["light_noise"].tolist())
-    if content["environment"] is not None:
-        t.environment = content["environment"].to(t.grid.device)
     t.step, t.seconds, t.n_rays, t.previewed_at = (content[x] for x in ("step", "seconds", "n_rays", "previewed_at"))
     t.log.psnr = content["psnr_mean"]
     # A run that was stopped for its export goes on with the export's refinement; one that has it trains on.

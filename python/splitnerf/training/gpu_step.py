@@ -81,10 +81,8 @@ class GpuStep(Step):
         self._graphs: dict[Hashable, Recorded] = {}
         self._stream = torch.cuda.Stream(model.device) if c.run.cuda_graphs else None
 
-    def __call__(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> Iterable[StepNumbers]:
-        pending = self.begin(batch, light, environment, step, progress)
+    def __call__(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> Iterable[StepNumbers]:
+        pending = self.begin(batch, light, step, progress)
         for leaf in light.leaves:
             if leaf.grad is not None:
                 leaf.grad.masked_fill_(~pending.allowed, 0.0)  # it would stay until the light moves
@@ -125,9 +123,7 @@ class GpuStep(Step):
         finally:
             outside.wait_stream(self._stream)
 
-    def gradients(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> tuple[RenderedRays, Terms]:
+    def gradients(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> tuple[RenderedRays, Terms]:
         c = self.model.config
         known = self.last.counts if self.last is not None else Capacity()
         is_bounded = known.samples <= self.sample_capacity and (c.sampling.min_weight > 0 or c.run.cuda_graphs)
@@ -137,7 +133,7 @@ class GpuStep(Step):
             self.capacity = Capacity(len(found.directions), *(in_units(SHADING_SLACK * n) for n in known[1:]))
 
         def differentiate(batch: Batch, found: FoundSamples, light: EvaluatedLight) -> tuple[RenderedRays, Terms]:
-            return self.differentiate(batch, found, light, environment, step, progress, self.capacity.of_shading)
+            return self.differentiate(batch, found, light, step, progress, self.capacity.of_shading)
 
         key = (*self._decided(step, progress), len(batch.target))
         if not c.run.cuda_graphs or self.capacity.samples != self.sample_capacity:

@@ -11,9 +11,11 @@ from torch import Tensor
 
 from splitnerf.devices import SideStream, in_background
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.fields import VisibilityBits
+from splitnerf.fields import EvaluatedLight, VisibilityBits
 from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
+
+ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion
 
 
 class TracedMesh(NamedTuple):
@@ -44,11 +46,14 @@ class SurfaceMesh:
         current: The mesh in use; None before the first.
         made_at: The training's progress in [0, 1] at the request for the mesh in use.
         asked_at: The training's progress in [0, 1] at the newest request.
+        environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None where none is traced, or before the
+            first mesh.
     """
 
     def __init__(self, model: SceneModel, *, background: bool = False):
         self.model, self.background, self.current = model, background, None
         self.made_at = self.asked_at = 0.0
+        self.environment: Tensor | None = None
         self._made: Future[TracedMesh | None] | None = None
         self._side = SideStream(model.device)
 
@@ -86,9 +91,25 @@ class SurfaceMesh:
             self._side.join()
             self._use(mesh)
 
+    def light_up(self, light: EvaluatedLight, step: int) -> None:
+        """Brings the light on the mesh up to date, where that is due in a step: what weighs its occlusion, and its indirect
+        light."""
+        c, model = self.model.config, self.model
+        if self.current is None:
+            return
+        if c.occlusion.kind == "mlp" and c.losses.occlusion_weight > 0:
+            if self.environment is None or step % ENVIRONMENT_EVERY == 0:
+                self.environment = model.light.panorama(c.constants.occlusion_environment_height)
+        if step % ENVIRONMENT_EVERY == 0:
+            model.weigh_occlusion(light)
+        if c.occlusion.indirect and step % c.constants.indirect_every == 0:
+            model.refresh_indirect(light)
+
     def restore(self, content: dict) -> None:
         """Uses the mesh of a checkpoint, if it has one."""
         self.asked_at = content["meshed_at"]
+        if (environment := content["environment"]) is not None:
+            self.environment = environment.to(self.model.device)
         mesh, light = (content["mesh_vertices"], content["mesh_faces"]), content["occlusion_light"]
         self._use(None if mesh[0] is None else traced(self.model, *mesh, light.get("aims")))
         if light:
@@ -98,7 +119,13 @@ class SurfaceMesh:
         """The part of the state that a checkpoint stores."""
         _, vertices, faces, _ = self.current or (None,) * 4
         light = {} if self.model.bits is None else self.model.bits.state()
-        return {"mesh_vertices": vertices, "mesh_faces": faces, "meshed_at": self.made_at, "occlusion_light": light}
+        return {
+            "mesh_vertices": vertices,
+            "mesh_faces": faces,
+            "meshed_at": self.made_at,
+            "environment": self.environment,
+            "occlusion_light": light,
+        }
 
     def _use(self, mesh: TracedMesh | None) -> None:
         self.made_at = self.asked_at

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 from splitnerf.config import Config
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
@@ -12,10 +15,11 @@ WEIGHT_DECAY = 0.01
 RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
 
 
-def progress_of(config: Config, step: int, seconds: float) -> float:
-    """The progress of the schedule in [0, 1]: the larger of the share of steps done and the share of minutes used."""
-    by_time = seconds / (60.0 * config.training_minutes) if config.training_minutes > 0 else 0.0
-    return min(1.0, max(step / config.run.steps, by_time))
+def progress_by(config: Config) -> Callable[[int, float], float]:
+    """The progress of the schedule in [0, 1] as a function of the steps and the seconds of a run: the larger of the share
+    of steps done and the share of minutes used."""
+    n_steps, most_seconds = config.run.steps, 60.0 * config.training_minutes or math.inf
+    return lambda step, seconds: min(1.0, max(step / n_steps, seconds / most_seconds))
 
 
 def cosine_anneal(config: Config, progress: float) -> float:

@@ -14,6 +14,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields import SdfField
 from splitnerf.ops import MeshScene
+from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import image_rays
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.render.stereo import (
@@ -199,6 +200,15 @@ def exact_distances(distances: Tensor, box: float) -> Tensor:
     away, _ = cKDTree(vertices).query(centres.reshape(-1, 3))
     signed = np.where(solid, -1.0, 1.0) * away.reshape(solid.shape)
     return torch.from_numpy(signed.astype(np.float32)).to(distances.device)
+
+
+def start_of(model: SceneModel, photos: Dataset, hull: Tensor, generator: torch.Generator) -> StartShape | None:
+    """The result of :func:`start_shape`, to which the levels of the model's field that are open at first are fitted."""
+    model.open_levels(0.0)
+    shape = start_shape(photos, hull, model.config)
+    if shape is not None:
+        fit_to(model.sdf_field, shape, generator, model.config)
+    return shape
 
 
 def fit_to(field: SdfField, shape: StartShape, generator: torch.Generator, config: Config) -> None:

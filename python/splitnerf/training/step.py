@@ -133,15 +133,12 @@ class Step:
     Attributes:
         capacity: The capacity of the last step's results.
         start: The shape that the run began with, near which the surface is held at first; None: a sphere, which holds nothing.
-        turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`; None: it stands
-            still.
         skipped: The number of steps whose gradients could not be used.
         newest: The rays of the last step, and their rendering.
         s: The sharpness as far as it is known without waiting.
     """
 
     start: StartShape | None = None
-    turns: Tensor | None = None
     newest: tuple[Batch, RenderedRays] | None = None
     s: float | None = None
 
@@ -159,15 +156,12 @@ class Step:
         self.optimiser, self.exposures, self.seen = optimiser, exposures, seen
         self.capacity, self.skipped, self._skipped_in_a_row = Capacity(), 0, 0
 
-    def __call__(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> Iterable[StepNumbers]:
+    def __call__(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> Iterable[StepNumbers]:
         """Takes the gradients of a batch and moves the parameters, those of the light where its turn has come.
 
         Args:
             batch: The rays.
             light: The evaluated light; of no use any more where its parameters moved.
-            environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
             step, progress: The number of the step, and the training's progress in [0, 1].
 
         Returns:
@@ -176,7 +170,7 @@ class Step:
         Raises:
             Diverged: The gradients of too many steps in a row are not finite.
         """
-        numbers = self.begin(batch, light, environment, step, progress).read()
+        numbers = self.begin(batch, light, step, progress).read()
         if self.judge(numbers):
             self.optimiser.step()
             if self.exposures.learned and progress > BEGIN:
@@ -191,11 +185,9 @@ class Step:
         """The context in which steps run."""
         return nullcontext()
 
-    def begin(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> PendingNumbers:
+    def begin(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> PendingNumbers:
         """Takes all gradients, and starts to fetch the step's numbers."""
-        ray, terms = self.gradients(batch, light, environment, step, progress)
+        ray, terms = self.gradients(batch, light, step, progress)
         if light_moves(self.model.config, step):
             light.backward()
         self.newest = batch, ray
@@ -236,16 +228,14 @@ class Step:
             note(f"step {numbers.step - 1}: the gradient is not finite; the step is skipped")
         return False
 
-    def gradients(
-        self, batch: Batch, light: EvaluatedLight, environment: Tensor | None, step: int, progress: float
-    ) -> tuple[RenderedRays, Terms]:
+    def gradients(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> tuple[RenderedRays, Terms]:
         """Finds the rays' samples, renders them and stores the gradients of the losses at the model's parameters and the
         light's leaves; the arguments are those of a call.
 
         Returns:
             The rendered rays, and the terms of the loss by name; the colour's term comes first.
         """
-        return self.differentiate(batch, self.find(batch, progress), light, environment, step, progress)
+        return self.differentiate(batch, self.find(batch, progress), light, step, progress)
 
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:
         """The samples of a batch, see :func:`splitnerf.render.renderer.find_samples`."""
@@ -262,7 +252,6 @@ class Step:
         batch: Batch,
         found: FoundSamples,
         light: EvaluatedLight,
-        environment: Tensor | None,
         step: int,
         progress: float,
         capacity: tuple[int, int] | None = None,
@@ -270,13 +259,12 @@ class Step:
         """Renders found samples and takes the gradients; for ``capacity`` see
         :func:`splitnerf.render.renderer.render_rays`."""
         c = self.model.config
-        turns = None if self.turns is None else self.turns[batch.view]
+        turns = None if self.model.turns is None else self.model.turns[batch.view]
         ray = render_rays(
             self.model, light, found, shades_per_ray=c.constants.shades_per_ray, capacity=capacity, turns=turns
         )
-        terms = losses.loss_terms(
-            self.model, light, batch, ray, self.mesh.scene, environment, self.generator, step, progress, self.seen
-        )
+        mesh = self.mesh.scene, self.mesh.environment
+        terms = losses.loss_terms(self.model, light, batch, ray, *mesh, self.generator, step, progress, self.seen)
         if self.is_held(progress):
             terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
             drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]
