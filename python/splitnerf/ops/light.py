@@ -224,15 +224,6 @@ def _map_backward(ctx, grad):
     return *[None] * 6, lib.sparse_product(*transposed, *forward, grad)
 
 
-def _keep_lookup(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
-
-
-def _lookup_backward(ctx, grad):
-    refuse_gradients(ctx, "light_lookup", nodes=5, zonal=6)
-    return *lib.light_lookup_backward(*ctx.saved_tensors, grad), None, None, None
-
-
 register(
     "sparse_product",
     fake=lambda *inputs: inputs[6].new_empty(inputs[0].shape[0] - 1, 3),
@@ -242,10 +233,8 @@ register(
 register(
     "light_lookup",
     fake=lambda directions, *rest: directions.new_empty(directions.shape),
-    setup_context=_keep_lookup,
-    backward=_lookup_backward,
+    gradients="directions roughness levels sh",
 )
-register("light_lookup_backward", fake=lambda *inputs: tuple(x.new_empty(x.shape) for x in inputs[:4]))
 
 
 def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
@@ -271,19 +260,4 @@ def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
     return lib.light_prior(texels, list(level_sizes))
 
 
-def _keep_texels(ctx, inputs, output):
-    texels, ctx.level_sizes = inputs
-    ctx.save_for_backward(texels)
-
-
-def _prior_backward(ctx, grad):
-    return lib.light_prior_backward(*ctx.saved_tensors, ctx.level_sizes, grad), None
-
-
-register(
-    "light_prior",
-    fake=lambda texels, level_sizes: texels.new_empty(()),
-    setup_context=_keep_texels,
-    backward=_prior_backward,
-)
-register("light_prior_backward", fake=lambda texels, level_sizes, grad_loss: texels.new_empty(texels.shape))
+register("light_prior", fake=lambda texels, level_sizes: texels.new_empty(()), gradients="texels")

@@ -330,17 +330,6 @@ def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
     )
 
 
-def _keep_composite(ctx, inputs, output):
-    *tensors, ctx.least_opacity = inputs
-    ctx.save_for_backward(*tensors)
-
-
-def _composite_backward(ctx, grad):
-    *_, opacity = tensors = ctx.saved_tensors
-    by_weights, by_values, by_opacity = lib.composite_backward(*tensors, ctx.least_opacity, grad)
-    return by_weights, by_values, None, None if opacity is None else by_opacity, None
-
-
 def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1, unit=None):
     sizes = (max_shaded, phase.shape[0], max_stretches)
     if max_shaded < 0:
@@ -404,14 +393,5 @@ register(
 register(
     "composite",
     fake=lambda weights, values, offsets, *rest: values.new_empty(offsets.shape[0] - 1, values.shape[1]),
-    setup_context=_keep_composite,
-    backward=_composite_backward,
-)
-register(
-    "composite_backward",
-    fake=lambda weights, values, offsets, opacity=None, *rest: (
-        weights.new_empty(weights.shape),
-        values.new_empty(values.shape),
-        weights.new_empty(0 if opacity is None else opacity.shape[0]),
-    ),
+    gradients="weights values opacity",
 )

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops._library import lib, register
 
 FRESNEL_MODES = ("exact", "paper", "code")
 QUERIES = ("mean", "reflection")
@@ -134,55 +134,15 @@ def split_sum_shade(
     )
 
 
-def _keep_query(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:4])
-    ctx.mean = inputs[4]
-
-
-def _queries_backward(ctx, *grads):
-    refuse_gradients(ctx, "light_queries", view_dirs=1, lut=3)
-    grad_normals, grad_roughness = lib.light_queries_backward(*ctx.saved_tensors, ctx.mean, *grads)
-    return grad_normals, None, grad_roughness, None, None
-
-
-def _keep_shade(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:10], *inputs[12:])
-    ctx.options = inputs[10:12]
-
-
-def _shade_backward(ctx, grad):
-    refuse_gradients(ctx, "split_sum_shade", lut=9, indirect_s=12, indirect_d=13)
-    *points, indirect_s, indirect_d = ctx.saved_tensors
-    grads = list(lib.split_sum_shade_backward(*points, *ctx.options, indirect_s, indirect_d, grad))
-    if points[6] is None:
-        grads[6] = None
-    return *grads, None, None, None, None, None
-
-
 register(
     "light_queries",
-    fake=lambda normals, *rest: (
-        normals.new_empty(2 * normals.shape[0], 3),
-        normals.new_empty(2 * normals.shape[0], 1),
-    ),
-    setup_context=_keep_query,
-    backward=_queries_backward,
-)
-register(
-    "light_queries_backward",
-    fake=lambda normals, view_dirs, roughness, *rest: tuple(t.new_empty(t.shape) for t in (normals, roughness)),
+    fake=lambda normals, *rest: (normals.new_empty(2 * len(normals), 3), normals.new_empty(2 * len(normals), 1)),
+    gradients="normals roughness",
 )
 register(
     "split_sum_shade",
     fake=lambda normals, *rest: normals.new_empty(normals.shape),
-    setup_context=_keep_shade,
-    backward=_shade_backward,
-)
-register(
-    "split_sum_shade_backward",
-    fake=lambda normals, *rest: tuple(
-        normals.new_empty((0, 3) if t is None else t.shape) for t in (normals, *rest[:8])
-    ),
+    gradients="normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d",
 )
 
 
@@ -322,72 +282,16 @@ def summed_correction(
     return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, table, compensate, split, share)
 
 
-def _keep_sums(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
+def _fake_sums(normals, *rest):
+    return normals.new_empty(normals.shape[0], len(LightSums._fields), 3)
 
 
-def _sums_backward(ctx, grad_sums):
-    refuse_gradients(ctx, "monte_carlo_light", view_dirs=1, light_dirs=3, pdf=4)
-    normals, roughness, radiance = lib.monte_carlo_light_backward(*ctx.saved_tensors, grad_sums)
-    return normals, None, roughness, None, None, radiance
-
-
-def _shared_backward(ctx, grad_sums):
-    refuse_gradients(ctx, "summed_light", view_dirs=1, directions=3, solid_angles=4, visible=6, sent=7)
-    normals, roughness, radiance = lib.summed_light_backward(*ctx.saved_tensors, grad_sums)
-    return normals, None, roughness, None, None, radiance, None, None
-
-
-def _keep_summed(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:7], *inputs[8:])
-    ctx.compensate = inputs[7]
-
-
-def _summed_backward(ctx, grad):
-    refuse_gradients(ctx, "shade_sums", lut=6, share=9)
-    *points, other, share = ctx.saved_tensors
-    *grads, grad_other = lib.shade_sums_backward(*points, ctx.compensate, other, share, grad)
-    return *grads, None, None, None if other is None else grad_other, None
-
-
-register(
-    "monte_carlo_light",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
-    setup_context=_keep_sums,
-    backward=_sums_backward,
-)
-register(
-    "monte_carlo_light_backward",
-    fake=lambda normals, view_dirs, roughness, light_dirs, pdf, radiance, grad_sums: (
-        normals.new_empty(normals.shape),
-        roughness.new_empty(roughness.shape),
-        radiance.new_empty(radiance.shape),
-    ),
-)
-register(
-    "summed_light",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape[0], len(LightSums._fields), 3),
-    setup_context=_keep_sums,
-    backward=_shared_backward,
-)
-register(
-    "summed_light_backward",
-    fake=lambda normals, view_dirs, roughness, directions, solid_angles, radiance, *rest: tuple(
-        t.new_empty(t.shape) for t in (normals, roughness, radiance)
-    ),
-)
+register("monte_carlo_light", fake=_fake_sums, gradients="normals roughness radiance")
+register("summed_light", fake=_fake_sums, gradients="normals roughness radiance")
 register(
     "shade_sums",
     fake=lambda normals, *rest: normals.new_empty(normals.shape),
-    setup_context=_keep_summed,
-    backward=_summed_backward,
-)
-register(
-    "shade_sums_backward",
-    fake=lambda *inputs: (
-        *(t.new_empty(t.shape) for t in inputs[:6]),
-        inputs[0].new_empty((0, 3) if inputs[8] is None else inputs[8].shape),
-    ),
+    gradients="normals view_dirs albedo roughness metallic sums other",
 )
 
 
@@ -410,19 +314,5 @@ def srgb_to_linear(srgb: Tensor) -> Tensor:
     return lib.srgb_to_linear(srgb)
 
 
-def _keep_linear(ctx, inputs, output):
-    ctx.save_for_backward(*inputs)
-
-
-def _srgb_backward(ctx, grad):
-    return lib.linear_to_srgb_backward(*ctx.saved_tensors, grad)
-
-
-register(
-    "linear_to_srgb",
-    fake=lambda linear: linear.new_empty(linear.shape),
-    setup_context=_keep_linear,
-    backward=_srgb_backward,
-)
-register("linear_to_srgb_backward", fake=lambda linear, grad_srgb: linear.new_empty(linear.shape))
+register("linear_to_srgb", fake=lambda linear: linear.new_empty(linear.shape), gradients="linear")
 register("srgb_to_linear", fake=lambda srgb: srgb.new_empty(srgb.shape))

@@ -95,16 +95,6 @@ def quadratic_entropy(x: Tensor) -> Tensor:
     return lib.quadratic_entropy(x)[0]
 
 
-def _keep_pixels(ctx, inputs, output):
-    *tensors, ctx.linear = inputs
-    ctx.save_for_backward(*tensors)
-
-
-def _pixel_backward(ctx, grad):
-    refuse_gradients(ctx, "pixel_losses", target=2, background=3, exposure=5)
-    return *lib.pixel_losses_backward(*ctx.saved_tensors, ctx.linear, grad), None, None, None, None, None
-
-
 def _keep_inputs_and_total(ctx, inputs, output):
     """Saves the inputs and the sum of weights, to which there is no gradient."""
     ctx.mark_non_differentiable(output[1])
@@ -128,13 +118,7 @@ def _entropy_backward(ctx, grad, _):
     return None if grad is None else ctx.saved_tensors[0] * grad
 
 
-register(
-    "pixel_losses", fake=lambda mean, *rest: mean.new_empty(2), setup_context=_keep_pixels, backward=_pixel_backward
-)
-register(
-    "pixel_losses_backward",
-    fake=lambda mean, opacity, *rest: (mean.new_empty(mean.shape), opacity.new_empty(opacity.shape)),
-)
+register("pixel_losses", fake=lambda mean, *rest: mean.new_empty(2), gradients="mean opacity")
 register(
     "gradient_losses",
     fake=lambda gradients, *rest: (gradients.new_empty(2), gradients.new_empty(())),
