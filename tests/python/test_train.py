@@ -21,7 +21,7 @@ from splitnerf.refinement.refine import STATE
 from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
-from splitnerf.training.observer import NOBODY, Observer, Request, together
+from splitnerf.training.observer import Request, together
 from splitnerf.training.schedule import light_period
 from tiny_runs import SMALL, as_options, contents, lines_of, tiny, train, train_scene
 
@@ -221,13 +221,6 @@ class Asking:
             self.heard.append((kind, None if path is None else (path / "mesh.glb").is_file()))
 
 
-def trained(data, run, config: Config, observer: Observer = NOBODY):
-    run.mkdir(exist_ok=True)
-    training = Training(load_dataset(data), config, run, CPU, observer)
-    training.complete()
-    return training
-
-
 def test_observers_learn_of_all_that_happens(data, tmp_path):
     asking, second = Asking(), Asking()
     config = tiny(steps=40, preview_every=0.5)
@@ -283,7 +276,7 @@ def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
         return None
 
     config = tiny(steps=40)
-    scene = trained(data, tmp_path, config, ending)
+    scene = train_scene(load_dataset(data), config, tmp_path, ending)
     assert scene.step == 24 and [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24]
     training = Training(load_dataset(data), config, tmp_path, CPU)
     training.restore()
@@ -296,7 +289,7 @@ def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
 def test_a_stopped_run_goes_on_where_it_was(data, tmp_path, stage_begun):
     """With its refinement, if that was interrupted; else with the training."""
     config = tiny(steps=40)
-    stopped = trained(data, tmp_path, config, Asking(20, Request.STOP))
+    stopped = train_scene(load_dataset(data), config, tmp_path, Asking(20, Request.STOP))
     assert stopped.finished and stopped.step == 20
     if stage_begun:
         (tmp_path / STATE).write_bytes(b"")
@@ -312,7 +305,7 @@ def test_a_checkpoint_is_saved_when_asked(data, tmp_path):
     asking.logged = lambda line: (
         steps.append(load_checkpoint(tmp_path / "checkpoint.pt")["step"]) if len(asking.requests) == 1 else None
     )
-    trained(data, tmp_path, tiny(steps=400), asking)
+    train_scene(load_dataset(data), tiny(steps=400), tmp_path, asking)
     assert set(steps) == {8}
 
 
@@ -344,6 +337,6 @@ def test_a_signal_ends_a_paused_run(data, tmp_path, number):
         signal.raise_signal(number)
         return Request.PAUSE
 
-    scene = trained(data, tmp_path, tiny(steps=400), pausing)
+    scene = train_scene(load_dataset(data), tiny(steps=400), tmp_path, pausing)
     assert not scene.finished and scene.step < 20
     assert load_checkpoint(tmp_path / "checkpoint.pt")["step"] == scene.step

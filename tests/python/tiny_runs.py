@@ -10,6 +10,7 @@ from splitnerf.cli import main
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import Dataset
 from splitnerf.training.loop import Training
+from splitnerf.training.observer import NOBODY, Observer
 
 # A tenth of the default sizes and less; the method is that of the preset.
 SMALL = dict(
@@ -52,9 +53,17 @@ def train(data: Path, run: Path, *options: str) -> int:
     return main(["train", str(data), "--out", str(run), *as_options(SMALL), *options])
 
 
-def train_scene(dataset: Dataset, config: Config, run: Path, *, device: str = "cpu", resume: bool = False) -> Training:
+def train_scene(
+    dataset: Dataset,
+    config: Config,
+    run: Path,
+    observer: Observer = NOBODY,
+    *,
+    device: str = "cpu",
+    resume: bool = False,
+) -> Training:
     """A training after its last step, in the folder `run`."""
-    training = Training(dataset, config, run, torch.device(device))
+    training = Training(dataset, config, run, torch.device(device), observer)
     training.begin(resume)
     training.complete()
     return training
