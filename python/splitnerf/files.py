@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 import socket
 import tempfile
 from collections.abc import Iterator
@@ -13,8 +14,10 @@ from typing import TextIO
 
 from splitnerf.errors import InputError, note
 
-LOCK = "lock"  # the file in a folder that names the program that writes there
-PARTIAL = ".partial"  # part of the name of a file that is not yet whole
+LOCK = ".splitnerf.lock"  # the file in a folder that names the program that writes there
+OWNER = "pid "  # its first word
+PARTIAL = ".splitnerf-partial-"  # how the name of a file begins that is not yet whole
+MARK = ".splitnerf"  # the file in a folder of the program's own, with what it was made for
 _locks: dict[Path, TextIO] = {}  # the locks of this program, by folder
 
 
@@ -34,7 +37,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     try:
         _check_locked(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=PARTIAL + path.suffix)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=PARTIAL, suffix=path.suffix)
         os.close(handle)
         temporary = Path(name)
         yield temporary
@@ -57,7 +60,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Locks a folder for this program within the block; the file `lock` in it names the program.
+    """Locks a folder for this program within the block; the file LOCK in it names the program.
 
     The lock ends with the program, however that ends. The next program takes the folder over and removes half-written
     files. A folder that the block leaves empty is removed, if it was not there before. This program may have locked it
@@ -104,9 +107,36 @@ def is_locked(folder: Path) -> bool:
 
 def remove_partial(folder: Path) -> None:
     """Removes half-written files of a killed program from a folder, and from folders in it that are not locked."""
-    inner = (leftover for leftover in folder.glob(f"*/.*{PARTIAL}*") if not is_locked(leftover.parent))
-    for leftover in (*folder.glob(f".*{PARTIAL}*"), *inner):
+    inner = (leftover for leftover in folder.glob(f"*/{PARTIAL}*") if not is_locked(leftover.parent))
+    for leftover in (*folder.glob(f"{PARTIAL}*"), *inner):
         leftover.unlink(missing_ok=True)
+
+
+def is_own(folder: Path) -> bool:
+    """Whether :func:`own_folder` made a folder."""
+    return not folder.is_symlink() and (folder / MARK).is_file()
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Raises InputError where a folder holds files, but :func:`own_folder` did not make it."""
+    if folder.is_symlink() or (
+        folder.exists() and not is_own(folder) and (not folder.is_dir() or any(folder.iterdir()))
+    ):
+        raise InputError(f"{folder}: holds other files, which would be replaced; move them, or give another --out")
+
+
+def own_folder(folder: Path, purpose: str = "") -> None:
+    """Makes a folder that the program may empty, and empties the one that it made before, but for the same purpose,
+    unless that is "". Raises InputError where the folder holds other files."""
+    refuse_foreign(folder)
+    mark = folder / MARK
+    if is_own(folder):
+        if purpose and mark.read_text(encoding="utf-8", errors="replace") == purpose:
+            return
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_path(mark) as temporary:
+        temporary.write_text(purpose, encoding="utf-8")
 
 
 def is_file(path: Path) -> bool:
@@ -123,10 +153,13 @@ def reason(error: OSError) -> str:
 
 
 def _acquired(path: Path) -> TextIO:
-    """The lock file at a path, locked, with this program's pid. Raises InputError where another program has it, OSError
-    where it cannot be written."""
+    """The lock file at a path, locked, with this program's pid. Raises InputError where another program has it or the
+    file is something else, OSError where it cannot be written."""
     while True:
-        lock = open(path, "a+", encoding="utf-8")
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link, and no lock of this program; remove it, or give another --out")
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+        lock = open(os.open(path, flags, 0o666), "a+", encoding="utf-8", errors="replace")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -139,9 +172,13 @@ def _acquired(path: Path) -> TextIO:
         if _is_at(lock, path):
             break
         lock.close()  # its owner ended and removed it in between
+    lock.seek(0)
+    if lock.read(len(OWNER)) not in ("", OWNER):
+        lock.close()
+        raise InputError(f"{path}: is no lock of this program; move it away, or give another --out")
     try:
         lock.truncate(0)
-        lock.write(f"pid {os.getpid()} on {socket.gethostname()}\n")
+        lock.write(f"{OWNER}{os.getpid()} on {socket.gethostname()}\n")
         lock.flush()
     except OSError:
         path.unlink(missing_ok=True)

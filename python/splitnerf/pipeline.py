@@ -20,7 +20,7 @@ from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.dataset import EXPOSURES, Dataset, dataset_fingerprint, load_dataset, spread, write_exposures
 from splitnerf.data.environment import read_environment
-from splitnerf.data.frames import has_test_split, refuse_data, split_rule
+from splitnerf.data.frames import has_test_split, split_rule
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
@@ -30,7 +30,7 @@ from splitnerf.errors import InputError, note, note_once
 from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.export.scene import Exported, write_assets
-from splitnerf.files import atomic_path, locked
+from splitnerf.files import atomic_path, is_own, locked
 from splitnerf.plugins import installed
 from splitnerf.refinement.fit import FitSettings
 from splitnerf.refinement.refine import (
@@ -45,7 +45,15 @@ from splitnerf.refinement.refine import (
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
-from splitnerf.run_folder import ORIGIN, check_run, clear_run, discard_refinement, is_refined, move_assets
+from splitnerf.run_folder import (
+    ORIGIN,
+    check_results,
+    check_run,
+    clear_run,
+    discard_refinement,
+    is_refined,
+    move_assets,
+)
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import Training
 from splitnerf.training.meshes import SurfaceMesh
@@ -142,8 +150,8 @@ def load_with_masks(
     find_masks = installed().find_masks
     train, test = load_splits(data, downscale, reading, masked=find_masks is None)
     if train.masked:
-        if overwrite:
-            shutil.rmtree(folder, ignore_errors=True)
+        if overwrite and is_own(folder):
+            shutil.rmtree(folder)
         return config, train, test
     minutes = config.run.max_minutes * config.separation.share
     steps = UNLIMITED if minutes > 0 else config.separation.steps
@@ -307,16 +315,18 @@ def export_run(
     n_faces: int | None = None,
     texture_size: int | None = None,
     resolution: int | None = None,
+    overwrite: bool = False,
 ) -> Exported:
     """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`.
 
     Raises:
-        InputError: The run cannot be used, or a format needs a package that is not installed.
+        InputError: The run cannot be used, files would be replaced (unless ``overwrite``), or a format needs a package
+            that is not installed.
         EmptyMesh: The surface is empty.
     """
     if is_refined(run) and out.resolve() == run.resolve():
         raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
-    refuse_data(out)
+    check_results(out, run, overwrite=overwrite)
     model, _, content = load_run(run)
     with locked(out):
         if (run / ORIGIN).is_file() and out.resolve() != run.resolve():

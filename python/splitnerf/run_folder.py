@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from splitnerf.config import Config
 from splitnerf.data.dataset import EXPOSURES
 from splitnerf.data.frames import refuse_data
 from splitnerf.devices import refuse_one_processor
@@ -18,6 +19,7 @@ ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
 RUN_FILES += (ORIGIN, EXPOSURES, *REFINEMENT_FILES)
+EXPORTED = ("mesh.obj", "mesh.mtl", "mesh.usdz")  # by request, beside those of a run
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
@@ -31,11 +33,34 @@ def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
         raise InputError(
             f"{run}: holds a run already; continue with --resume, replace it with --overwrite, or give another --out"
         )
+    if overwrite and present_in(run) and not is_run(run):
+        raise InputError(f"{run / present_in(run)[0]}: is of no run, and would be deleted; give another --out")
+
+
+def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
+    """Checks that results of a run can be written into a folder. Raises InputError where they would replace a data set,
+    what belongs to another run or, unless ``overwrite``, other files."""
+    refuse_data(out)
+    if out.resolve().is_relative_to(run.resolve()):
+        return
+    if (out / "checkpoint.pt").exists():
+        raise InputError(f"{out}: holds another run, whose results would be replaced; give another --out")
+    present = [name for name in (*RUN_FILES, *EXPORTED) if (out / name).exists()]
+    if present and not overwrite:
+        raise InputError(f"{out / present[0]}: would be replaced; give another --out, or --overwrite")
 
 
 def present_in(run: Path) -> list[str]:
     """The files of a run that a folder holds."""
     return [name for name in RUN_FILES if (run / name).exists()]
+
+
+def is_run(run: Path) -> bool:
+    """Whether a folder holds a run, which begins with its settings."""
+    try:
+        return (run / "checkpoint.pt").is_file() or bool(Config.read(run / "config.toml"))
+    except InputError:
+        return False
 
 
 def clear_run(run: Path) -> None:

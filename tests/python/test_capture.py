@@ -19,7 +19,7 @@ from splitnerf.data.frames import TEST_STRIDE
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.errors import InputError
 from splitnerf.fields import LightPyramid
-from splitnerf.files import LOCK, PARTIAL
+from splitnerf.files import LOCK, PARTIAL, own_folder
 from splitnerf.training.losses import SeenLight
 from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
@@ -33,7 +33,7 @@ from splitnerf_tools.capture.photographs import (
 )
 from splitnerf_tools.capture.photometry import find_exposures
 from splitnerf_tools.capture.poses import Lens, Reconstruction
-from splitnerf_tools.capture.prepare import PrepareSettings, _begin, _upright_copies, _without_camera
+from splitnerf_tools.capture.prepare import PrepareSettings, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
@@ -223,14 +223,13 @@ def test_a_folder_is_prepared_by_one_program(tmp_path, capsys):
     """A second one is refused, and what a killed one left half-written among the photos is no photo."""
     write_photos(tmp_path / "photos", 3)
     out = tmp_path / "data"
-    (out / "work").mkdir(parents=True)
+    own_folder(out / "work", "photos")
     (out / LOCK).write_text("pid 1 on elsewhere")
     with open(out / LOCK) as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert main(["prepare", str(tmp_path / "photos"), "--out", str(out)]) == 2
     assert "in use by pid 1 on elsewhere" in capsys.readouterr().err
-    deep = out / "work/photos/lens_1" / f".p_00.x{PARTIAL}.png"
-    _begin(out / "work", find_photographs(tmp_path / "photos"), PrepareSettings())
+    deep = out / "work/photos/lens_1" / f"{PARTIAL}p.png"
     deep.parent.mkdir(parents=True)
     deep.touch()
     _upright_copies(find_photographs(tmp_path / "photos"), out / "work")
@@ -278,6 +277,7 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     for number in range(12):
         writer.write(sharp if number in (2, 5, 9) else blurred)
     writer.release()
+    (tmp_path / "frames").mkdir()
     write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, lambda share: None)
     frames = sorted((tmp_path / "frames").iterdir())
     assert len(frames) == 3

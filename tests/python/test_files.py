@@ -208,7 +208,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, monkeypatch):
     def fails(*_, **__):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr(files, "open", fails, raising=False)
+    monkeypatch.setattr(files.os, "open", fails)
     with (
         pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"),
         locked(tmp_path / "a"),
@@ -219,8 +219,8 @@ def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, monkeypatch):
 
 def test_what_a_killed_program_left_is_removed(tmp_path):
     """And no other hidden file."""
-    for name in (f".checkpoint.abc{PARTIAL}.pt", ".mine.pt"):
+    for name in (f"{PARTIAL}abc.pt", ".mine.partial.pt"):
         (tmp_path / name).touch()
     with locked(tmp_path):
         pass
-    assert [path.name for path in tmp_path.iterdir()] == [".mine.pt"]
+    assert [path.name for path in tmp_path.iterdir()] == [".mine.partial.pt"]

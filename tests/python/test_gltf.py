@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, beside, triangle
-from splitnerf.data.gltf import read_asset
+from splitnerf.data.gltf import document, read_asset
 from splitnerf.data.images import srgb_to_linear
+from splitnerf.errors import InputError
 
 
 def z_up(vectors):
@@ -252,3 +253,15 @@ def test_a_buffer_that_nothing_uses_may_be_missing(path):
     gltf = triangle()
     gltf.json["buffers"] = [{"byteLength": len(gltf.binary)}, {"uri": "x" * 5000, "byteLength": 4}]
     assert len(read_asset(gltf.write(path)).triangles) == 1
+
+
+def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatch):
+    """3 + 3 values of 40 bytes, of half of what is available."""
+    triangle().write(path)
+    for available, fits in ((1 << 16, True), (2 * 40 * 8, False)):
+        monkeypatch.setattr(document, "memory_bytes", lambda: (1 << 40, available))
+        if fits:
+            read_asset(path)
+        else:
+            with pytest.raises(InputError, match="needs more than half of the available memory"):
+                read_asset(path)

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 from splitnerf.cli import BAD_INPUT, build_parser, main
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, is_locked, remove_partial
+from splitnerf.files import LOCK, PARTIAL, is_locked, remove_partial
 from splitnerf_tools.batch import child
 from splitnerf_tools.batch.child import Outcome, Work, train_scene
 from splitnerf_tools.batch.cluster import Share, share_of
@@ -222,11 +222,11 @@ def test_a_run_in_use_is_waited_for_and_then_left_alone(tmp_path, monkeypatch):
         outcome = train_scene(work_in(tmp_path, tmp_path))
         assert outcome == Outcome(None, f"{tmp_path / 'run'}: is in use by another program", False)
         halves = list((tmp_path / "run/sub").iterdir())
-        (tmp_path / "run/.half.partial.glb").touch()
+        (tmp_path / f"run/{PARTIAL}half.glb").touch()
         (tmp_path / "left").mkdir()
-        (tmp_path / "left/.half.partial.glb").touch()
+        (tmp_path / f"left/{PARTIAL}half.glb").touch()
         remove_partial(tmp_path)
-        assert (tmp_path / "run/.half.partial.glb").exists() and not list((tmp_path / "left").iterdir()) and halves
+        assert (tmp_path / f"run/{PARTIAL}half.glb").exists() and not list((tmp_path / "left").iterdir()) and halves
     assert (tmp_path / "run" / LOCK).exists() and not is_locked(tmp_path / "run") and not is_locked(tmp_path)
 
 

@@ -442,10 +442,16 @@ def test_silent_connections_leave_files_for_the_run(served, monkeypatch):
 
 def test_a_connection_without_a_token_is_closed_soon(shown_run, monkeypatch):
     assert server_module.Handler.timeout < server_module.TIMEOUT
-    monkeypatch.setattr(server_module.Handler, "timeout", 0.05)
+    monkeypatch.setattr(server_module.Handler, "timeout", 0.2)
     with serving(shown_run) as server, silent(server) as page:
         page.sendall(b"GET /")
         assert page.recv(1) == b""
+        wait_until(lambda: server._open == 0)
+    with serving(shown_run) as server, silent(server) as page:  # one that sends a byte now and then
+        with pytest.raises(OSError):
+            for _ in range(200):
+                page.sendall(b"G")
+                time.sleep(0.02)
         wait_until(lambda: server._open == 0)
 
 

@@ -132,6 +132,8 @@ def check_usage(args: argparse.Namespace) -> None:
             raise InputError(f"--{name} takes one run, got {len(args.targets)}; evaluate them one by one")
     if args.sheet is not None and args.sheet.suffix.lower() not in (".png", ".jpg"):
         raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
+    if args.sheet is not None and args.sheet.exists():
+        raise InputError(f"{args.sheet}: exists, and would be replaced; give another --sheet")
     holds = holds_published if args.protocol else holds_evaluation
     for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):

@@ -35,6 +35,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
     ):
         parser.add_argument(option, type=kind, default=default, metavar=name, help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace an earlier export in --out")
     parser.set_defaults(execute=run)
 
 
@@ -58,7 +59,13 @@ def run(args: argparse.Namespace) -> int:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     exported = export_run(
-        args.run, out, formats=formats, n_faces=args.faces, texture_size=args.texture_size, resolution=args.resolution
+        args.run,
+        out,
+        formats=formats,
+        n_faces=args.faces,
+        texture_size=args.texture_size,
+        resolution=args.resolution,
+        overwrite=args.overwrite,
     )
     closed = "watertight" if exported.watertight else "not watertight"
     dropped = f"{exported.n_dropped} floating or enclosed component{'' if exported.n_dropped == 1 else 's'} dropped"

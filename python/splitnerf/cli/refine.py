@@ -30,6 +30,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--resume", action="store_true", help="continue from the state that an interruption left")
     add("--keep-shape", action="store_true", help="leave the vertices where they are")
     add("--out", type=Path, metavar="DIR", help="where to write (default: RUN/refined)")
+    add("--overwrite", action="store_true", help="replace an earlier result in --out")
     parser.set_defaults(execute=run)
 
 
@@ -37,6 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import FitSettings
     from splitnerf.refinement.refine import refine_run
+    from splitnerf.run_folder import check_results
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
@@ -46,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
+    check_results(out, args.run, overwrite=args.overwrite or args.resume)
     settings = FitSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
     refined = refine_run(
         args.run,

@@ -27,13 +27,21 @@ class MeshScene:
 
     Args:
         vertices: [n, 3] float32, scene units.
-        faces: [m, 3] int32.
+        faces: [m, 3] integers.
 
     Raises:
+        TypeError: The faces are no integers.
         ValueError: The mesh is empty, an index is out of range or a vertex is not finite.
     """
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray):
+        faces = np.asarray(faces)
+        if faces.size and not np.issubdtype(faces.dtype, np.integer):
+            raise TypeError(f"MeshScene: faces must be integers, got {faces.dtype}")
+        if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):  # the cast below would wrap them
+            raise ValueError(
+                f"MeshScene: faces refer to vertices from {faces.min()} to {faces.max()} of {len(vertices)}"
+            )
         self._scene = _core.Scene(
             np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.int32)
         )

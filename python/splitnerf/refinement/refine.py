@@ -15,7 +15,6 @@ import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, with_exposures
 from splitnerf.data.environment import read_environment
-from splitnerf.data.frames import refuse_data
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import area_average
 from splitnerf.data.json_files import read_json, write_json
@@ -256,7 +255,6 @@ def refine_run(
 ) -> Refined | None:
     """Refines what training exported into a run; see :func:`refine_folder`."""
     source = source_of(run)
-    refuse_data(out)
     with locked(out):
         read_source(source)
         dataset = with_exposures(load_dataset(data, "train", downscale, reading), run)

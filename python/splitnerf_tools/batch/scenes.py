@@ -10,7 +10,7 @@ from pathlib import Path
 
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError, plain
-from splitnerf.files import atomic_path
+from splitnerf.files import LOCK, atomic_path
 
 from splitnerf_tools.ablate.scores import value_at
 
@@ -75,7 +75,7 @@ def scene_name(data: str, taken: Iterable[str]) -> str:
     """A name for a scene's run: that of its folder, without what is unsafe in a file system, a shell or a terminal, and
     with a number where it is taken. Names that differ by case only are equal."""
     safe = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
-    own = {STATE, TABLE, LOGS, "lock", "ray"}  # logs/ray.log is Ray's
+    own = {STATE, TABLE, LOGS, LOCK, "ray"}  # logs/ray.log is Ray's
     used = {name.lower() for name in (*taken, *own)}
     name, number = safe, 2
     while name.lower() in used:

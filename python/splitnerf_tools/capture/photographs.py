@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 from PIL import ExifTags, Image, ImageOps
 from splitnerf.data.images import from_profile
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once, plain
 from splitnerf.files import atomic_path
 
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
@@ -67,8 +68,14 @@ def find_photographs(folder: Path) -> list[Photograph]:
     for path in paths:
         seen.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
     stems = [path.stem for path in seen.values()]
-    names = [path.stem if stems.count(path.stem) == 1 else path.name.replace(".", "_") for path in seen.values()]
-    return [_described(path, name) for path, name in zip(seen.values(), names)]
+    taken = {stem for stem in stems if stems.count(stem) == 1}
+    named = []
+    for path, stem in zip(seen.values(), stems):
+        name = stem if stem in taken else path.name.replace(".", "_")
+        while stem not in taken and name in taken | {photo.name for photo in named}:
+            name += "_"
+        named.append(_described(path, name))
+    return named
 
 
 def read_upright(path: Path) -> np.ndarray:
@@ -82,8 +89,11 @@ def read_upright(path: Path) -> np.ndarray:
             import rawpy
         except ImportError:
             raise InputError(f"{path}: raw photos need the package rawpy; pip install 'splitnerf[raw]'") from None
-        with rawpy.imread(str(path)) as raw:
-            return raw.postprocess(gamma=(2.4, 12.92), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+        try:
+            with rawpy.imread(str(path)) as raw:
+                return raw.postprocess(gamma=(2.4, 12.92), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+        except (rawpy.LibRawError, OSError) as error:
+            raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
         upright, profile = ImageOps.exif_transpose(image), image.info.get("icc_profile")
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
@@ -95,7 +105,7 @@ def read_upright(path: Path) -> np.ndarray:
 def is_upright(photo: Photograph) -> bool:
     """Whether the rows of the file are those of the photo."""
     with _open(photo.path) as image:
-        return image.getexif().get(ExifTags.Base.Orientation, 1) == 1
+        return _exif(image, photo.path).get(ExifTags.Base.Orientation, 1) == 1
 
 
 def sharpness(photo: np.ndarray) -> float:
@@ -103,7 +113,8 @@ def sharpness(photo: np.ndarray) -> float:
     grey = cv2.cvtColor(np.ascontiguousarray(photo), cv2.COLOR_RGB2GRAY).astype(np.float32)
     grey *= 255.0 / np.iinfo(photo.dtype).max
     scale = min(1.0, SHARPNESS_WIDTH / max(grey.shape))
-    small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    size = [max(1, round(scale * n)) for n in grey.shape[::-1]]
+    small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     return float(cv2.Laplacian(small, cv2.CV_32F).var())
 
 
@@ -112,7 +123,7 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
 
     Args:
         video: The file.
-        folder: The folder for the frames; frames that are there already are kept.
+        folder: The folder for the frames, which is there.
         n: The number of frames, at least 1.
         report: Called with the share done.
 
@@ -123,7 +134,6 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
     total = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
     if not reader.isOpened() or total < 1:
         raise InputError(f"{video}: is no video that can be read; convert it to mp4, or give a folder of photos")
-    folder.mkdir(parents=True, exist_ok=True)
     best, most, window = None, -1.0, 0
     for number in range(total + 1):
         read, frame = reader.read() if number < total else (False, None)
@@ -168,15 +178,26 @@ def _open(path: Path) -> Image.Image:
     return image
 
 
+def _exif(image: Image.Image, path: Path) -> Image.Exif:
+    """What the file says of the photo; nothing where that is damaged, with a note."""
+    try:
+        exif = image.getexif()
+        exif.get_ifd(ExifTags.IFD.Exif)  # read now, since damage shows only here
+        return exif
+    except (OSError, ValueError, TypeError, SyntaxError, KeyError, struct.error) as error:
+        note_once(f"{path}: its EXIF data are damaged ({plain(str(error))}), and not used")
+        return Image.Exif()
+
+
 def _described(path: Path, name: str) -> Photograph:
     if path.suffix.lower() in RAW:
         height, width = read_upright(path).shape[:2]
         return Photograph(path, name, width, height, None, f"{path.suffix} {width}x{height}", None)
     with _open(path) as image:
-        exif = image.getexif()
+        exif = _exif(image, path)
         details = exif.get_ifd(ExifTags.IFD.Exif)
         width, height = image.size
-        if exif.get(ExifTags.Base.Orientation, 1) >= 5:
+        if exif.get(ExifTags.Base.Orientation, 1) in (5, 6, 7, 8):
             width, height = height, width
     seconds, f_number = (_positive(details.get(tag)) for tag in (ExifTags.Base.ExposureTime, ExifTags.Base.FNumber))
     sensitivity = details.get(ExifTags.Base.ISOSpeedRatings)

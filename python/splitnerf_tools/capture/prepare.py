@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from splitnerf.data.dataset import SURROUNDINGS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.errors import InputError, note
-from splitnerf.files import LOCK, atomic_path, locked, remove_partial
+from splitnerf.files import LOCK, atomic_path, is_own, locked, own_folder, reason, remove_partial
 
 from splitnerf_tools.capture.masks import find_masks, given_masks, mask_files
 from splitnerf_tools.capture.page import write_page
@@ -88,16 +87,13 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         InputError: The photos cannot be read or do not fit together, or the folder holds other files.
     """
     work = out / "work"
-    if (
-        out.is_dir()
-        and {path.name for path in out.iterdir()} - {LOCK}
-        and not (work.is_dir() or (out / "frames").is_dir())
-    ):
+    others = out.is_dir() and {path.name for path in out.iterdir()} - {LOCK}
+    if others and not (is_own(work) or is_own(out / "frames")):
         raise InputError(f"{out}: holds other files; give a new folder")
     with locked(out):
         photos = _photographs(source, out, settings, report)
         masks = None if settings.masks is None else mask_files(photos, settings.masks)
-        _begin(work, photos, settings)
+        own_folder(work, fingerprint([photo.path for photo in photos], settings.seed, settings.turntable))
         kept, left_out = _sorted_out(photos, report)
         images = _upright_copies(kept, work)
         moving = work / "moving" if settings.turntable else None
@@ -119,20 +115,22 @@ def _photographs(
     """The photos of a folder, or the frames of a video, which are written into `out/frames`."""
     if source.suffix.lower() not in VIDEO:
         return find_photographs(source)
-    write_frames(source, out / "frames", settings.frames, lambda share: report("frames", share))
-    return find_photographs(out / "frames")
+    folder, done = out / "frames", out / "frames" / "all"
+    own_folder(folder, fingerprint([source], settings.frames))
+    if not done.exists():
+        write_frames(source, folder, settings.frames, lambda share: report("frames", share))
+        done.touch()
+    return find_photographs(folder)
 
 
-def _begin(work: Path, photos: list[Photograph], settings: PrepareSettings) -> None:
-    """Empties the working folder where it holds another set of photos."""
-    files = [(p.name, p.path.stat().st_size, p.path.stat().st_mtime_ns) for p in photos]
-    print_of_photos = hashlib.sha256(json.dumps([files, settings.seed, settings.turntable]).encode()).hexdigest()
-    marker = work / "photos.sha256"
-    if work.exists() and (not marker.exists() or marker.read_text() != print_of_photos):
-        shutil.rmtree(work)
-    work.mkdir(parents=True, exist_ok=True)
-    with atomic_path(marker) as temporary:
-        temporary.write_text(print_of_photos)
+def fingerprint(files: Sequence[Path], *settings: object) -> str:
+    """A hash of settings and of files by their paths, sizes and times. Raises InputError where a file cannot be
+    read."""
+    try:
+        stats = [(str(path.resolve()), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read ({reason(error)})") from None
+    return hashlib.sha256(json.dumps([stats, settings]).encode()).hexdigest()
 
 
 def _sorted_out(
@@ -150,6 +148,8 @@ def _sorted_out(
             reasons[photo.name] = "too dark"
         elif s < BLURRED * np.median(sharp):
             reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
+    if len(reasons) == len(photos):
+        raise InputError(f"{photos[0].path.parent}: all photos are too dark; expose them longer")
     return [photo for photo in photos if photo.name not in reasons], reasons
 
 

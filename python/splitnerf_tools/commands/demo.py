@@ -34,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import preset
     from splitnerf.data.frames import refuse_data
-    from splitnerf.files import locked
+    from splitnerf.files import locked, own_folder
     from splitnerf.pipeline import reconstruct
     from splitnerf.run_folder import check_run
 
@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
         check_run(args.out, resume=False, overwrite=args.overwrite)
         if not args.overwrite:
             refuse_data(data)
+        own_folder(data)
         print(f"rendering the demo scene into {data} ...", file=sys.stderr)
         write_demo_dataset(data, seed=args.seed)
         trained, evaluation = reconstruct(data, args.out, config, overwrite=args.overwrite)

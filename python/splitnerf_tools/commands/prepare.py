@@ -63,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
     missing = [name for module, name in PACKAGES.items() if find_spec(module) is None]
     if missing:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
+    if not 0 <= args.seed < 1 << 31:
+        raise InputError(f"--seed must be at least 0 and less than {1 << 31}, got {args.seed}")
     from splitnerf.progress import Progress, ended_by_signals
 
     from splitnerf_tools.capture.prepare import PrepareSettings, prepare

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from splitnerf.data.json_files import write_json
 from splitnerf.data.photos import resized_mask, separated_mask
 from splitnerf.data.reading import SEPARATION
 from splitnerf.errors import InputError, note_once
+from splitnerf.files import own_folder, refuse_foreign
 from splitnerf.progress import Progress, ended_by_signals, tracked
 
 from splitnerf_tools.separation.field import RadianceField
@@ -64,6 +64,7 @@ def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, 
         RuntimeError: Numbers of the training are no longer finite.
     """
     started = time.monotonic()
+    refuse_foreign(folder)
     data = train.root
     note_once(
         f"{data}: nothing says where the object is; it is looked for in the middle of the photos, see {folder / SHEET}"
@@ -81,8 +82,7 @@ def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, 
             )
         points = surface_points(field, train)
         region = find_object(field, train, table_under(points, train, seed), points)
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
+        own_folder(folder)
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
         around = surroundings(field, region, points)
         write_image(folder / SURROUNDINGS, around / np.float32([usual] * 3 + [1]))

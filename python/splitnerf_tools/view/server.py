@@ -16,7 +16,7 @@ import socketserver
 import struct
 import sys
 import threading
-from contextlib import closing
+from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
@@ -39,7 +39,10 @@ LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera
 PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
 WITHOUT_REST = ("", "scene.json", "final", "events")  # addresses that nothing follows
-FIRST_TIMEOUT, TIMEOUT = 5.0, 60.0  # seconds that a connection may be silent: before its token is checked, and after
+FIRST_TIMEOUT, TIMEOUT = (
+    5.0,
+    60.0,
+)  # seconds: until the token of a connection is checked, and that it may be silent after
 MOST_OPEN = 64  # connections at a time: the run that is shown needs files too
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -177,6 +180,21 @@ class Handler(BaseHTTPRequestHandler):
     timeout = FIRST_TIMEOUT
     server_version, sys_version = "splitnerf", ""
 
+    def setup(self) -> None:
+        """Closes the connection later, unless a token comes in time: a byte now and then does not count."""
+        super().setup()
+        self.deadline = threading.Timer(self.timeout, self._hang_up)
+        self.deadline.daemon = True
+        self.deadline.start()
+
+    def finish(self) -> None:
+        self.deadline.cancel()
+        super().finish()
+
+    def _hang_up(self) -> None:
+        with suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
+
     def do_GET(self) -> None:
         self._answered(
             {
@@ -222,6 +240,7 @@ class Handler(BaseHTTPRequestHandler):
             raise Refused(
                 HTTPStatus.FORBIDDEN, "the token is missing or wrong; open the address that splitnerf printed"
             )
+        self.deadline.cancel()
         self.connection.settimeout(TIMEOUT)
         return inner
 

@@ -13,11 +13,14 @@ import numpy as np
 
 from splitnerf.errors import InputError
 from splitnerf.files import is_file
+from splitnerf.memory import memory_bytes
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 GLB_HEADER, CHUNK_HEADER = 12, 8
 LEAST_VALUES, MOST_VALUES, VALUES_PER_BYTE = 1 << 22, 1 << 30, 4096
+BYTES_OF_VALUE, BYTES_OF_PIXEL = 40, 8  # that a number of an accessor or of a texture takes while the asset is made
+MEMORY_SHARE = 0.5  # of what is available, for one file
 
 
 class Document:
@@ -45,15 +48,18 @@ class Document:
             raise InputError(f"{path}: is glTF {version}; only 2.0 is read, export it again")
         self._buffers: dict[int, bytes] = {}
         self._files: dict[str, bytes] = {}
-        self._left = LEAST_VALUES
+        self._left, self._memory = LEAST_VALUES, MEMORY_SHARE * memory_bytes()[1]
         self._earn(len(data))
 
-    def spend(self, n_values: int) -> None:
+    def spend(self, n_values: int, bytes_each: int) -> None:
         """Counts numbers before they are unpacked, since few bytes can expand to very many numbers. Raises InputError
-        where the total is larger than files of this size can hold."""
+        where the total is larger than files of this size can hold, or than memory is available for it."""
         self._left -= n_values
         if self._left < 0:
             raise InputError(f"{self.path}: unpacks to more than its size makes likely; export it again, smaller")
+        self._memory -= n_values * bytes_each
+        if self._memory < 0:
+            raise InputError(f"{self.path}: needs more than half of the available memory; export it again, smaller")
 
     def get(self, name: str) -> list:
         """A top-level array such as "nodes", empty where the file has none."""
@@ -65,7 +71,7 @@ class Document:
         accessor = self.json["accessors"][index]
         dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
         count = accessor["count"]
-        self.spend(max(0, count) * width)
+        self.spend(max(0, count) * width, BYTES_OF_VALUE)
         values = np.zeros((count, width), dtype)
         if "bufferView" in accessor:
             values = self._table(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from splitnerf.data.asset import Material
-from splitnerf.data.gltf.document import Document
+from splitnerf.data.gltf.document import BYTES_OF_PIXEL, Document
 from splitnerf.data.images import decode_image, srgb_to_linear
 from splitnerf.errors import InputError, note
 
@@ -96,7 +96,7 @@ class TextureSlots:
             )
         data, image = document.image(texture.get("source", webp.get("source")))
         pixels = decode_image(data, image)
-        document.spend(pixels.size)
+        document.spend(pixels.size, BYTES_OF_PIXEL)
         if not np.isfinite(pixels).all():
             raise InputError(f"{image}: has NaN or infinite pixels; clean it and export again")
         return pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)

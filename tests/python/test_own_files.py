@@ -1,0 +1,143 @@
+"""A user's own files are never lost: the program deletes and replaces what it can show to be its own."""
+
+from __future__ import annotations
+
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+from splitnerf.cli import BAD_INPUT, DONE
+from splitnerf.errors import InputError
+from splitnerf.files import LOCK, is_own, locked, own_folder
+from splitnerf_tools.capture.photographs import find_photographs
+from splitnerf_tools.capture.prepare import fingerprint
+from splitnerf_tools.separation.separate import separate
+from tiny_runs import command, contents, train
+
+
+def refused(capsys, said: str, *words: object) -> None:
+    """That a command is refused in one line."""
+    capsys.readouterr()
+    assert command(*words) == BAD_INPUT
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
+    assert said in line
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """A folder of the user's."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    return folder
+
+
+def test_a_lock_is_no_file_of_the_users(mine, tmp_path):
+    """Neither one of that name nor the target of a link, which may come from a stranger's archive."""
+    (tmp_path / "key").write_text("secret")
+    (mine / LOCK).symlink_to(tmp_path / "key")
+    with pytest.raises(InputError, match="is a link, and no lock"), locked(mine):
+        pass
+    (mine / LOCK).unlink()
+    (mine / LOCK).write_text("thesis")
+    with pytest.raises(InputError, match="is no lock of this program"), locked(mine):
+        pass
+    assert (tmp_path / "key").read_text() == "secret" and (mine / LOCK).read_text() == "thesis"
+
+
+def test_a_folder_is_emptied_only_by_its_maker(mine, tmp_path):
+    """And kept for the same purpose. A link to a folder of ours is the user's."""
+    own_folder(mine, "a")
+    (mine / "result").touch()
+    own_folder(mine, "a")
+    assert (mine / "result").exists()
+    own_folder(mine, "b")
+    assert not (mine / "result").exists() and is_own(mine)
+    (tmp_path / "link").symlink_to(mine)
+    with pytest.raises(InputError, match="link: holds other files"):
+        own_folder(tmp_path / "link")
+    (mine / ".splitnerf").rename(mine / "thesis")
+    for purpose in ("b", ""):
+        with pytest.raises(InputError, match="mine: holds other files"):
+            own_folder(mine, purpose)
+    assert (mine / "thesis").exists()
+
+
+@pytest.mark.parametrize("name", ["work", "frames", "images"])
+def test_prepare_keeps_folders_of_its_names(mine, tmp_path, capsys, name):
+    (tmp_path / "photos").mkdir()
+    cv2.imwrite(str(tmp_path / "photos/a.png"), np.full((40, 60, 3), 99, np.uint8))
+    (mine / name).mkdir()
+    (mine / name / "thesis.txt").write_text("x")
+    before = contents(mine)
+    refused(capsys, "mine: holds other files", "prepare", tmp_path / "photos", "--out", mine)
+    assert contents(mine) == before
+
+
+def test_masks_are_not_found_into_a_users_folder(mine):
+    (mine / "thesis.txt").touch()
+    with pytest.raises(InputError, match="mine: holds other files"):
+        separate(None, None, mine, steps=1, minutes=0.0, seed=0)
+    assert (mine / "thesis.txt").exists()
+
+
+def test_overwrite_replaces_runs_alone(data, mine, done, capsys):
+    for name in ("mesh.glb", "report.html", "config.toml"):
+        (mine / name).write_text("mine = 1")
+    before = contents(mine)
+    assert train(data, mine, "--steps", "1", "--overwrite") == BAD_INPUT
+    assert "mine/config.toml: is of no run, and would be deleted" in capsys.readouterr().err
+    assert contents(mine) == before
+    (done / "separated").mkdir()
+    (done / "separated/thesis.txt").touch()
+    assert train(data, done, "--steps", "1", "--overwrite") == DONE
+    assert (done / "separated/thesis.txt").exists()
+
+
+@pytest.mark.parametrize(("name", "words"), [("export", ("--formats", "obj")), ("refine", ("--data", "data"))])
+def test_results_do_not_replace_others(done, mine, tmp_path, capsys, name, words):
+    """Those of another run never, other files only as asked."""
+    other = shutil.copytree(done, tmp_path / "other")
+    (mine / "mesh.obj").write_text("mine")
+    before = contents(other) | contents(mine)
+    for more in ((), ("--overwrite",)):
+        refused(capsys, "other: holds another run", name, done, *words, "--out", other, *more)
+    refused(capsys, "mine/mesh.obj: would be replaced", name, done, *words, "--out", mine)
+    assert contents(other) | contents(mine) == before
+
+
+def test_an_export_is_replaced_as_asked(done, mine):
+    (mine / "mesh.obj").write_text("mine")
+    assert command("export", done, "--out", mine, "--formats", "obj", "--overwrite") == DONE
+    assert (mine / "mesh.obj").read_text() != "mine"
+
+
+def test_a_sheet_replaces_nothing(data, done, mine, capsys):
+    (mine / "photo.png").write_bytes(b"photo")
+    refused(capsys, "photo.png: exists", "evaluate", done, "--data", data, "--sheet", mine / "photo.png")
+    assert (mine / "photo.png").read_bytes() == b"photo"
+
+
+def test_the_demo_renders_into_no_folder_of_the_users(mine, capsys):
+    (mine / "data").mkdir()
+    (mine / "data/light.hdr").write_text("mine")
+    for more in ((), ("--overwrite",)):
+        refused(capsys, "data: holds other files", "demo", "--out", mine, *more)
+    assert (mine / "data/light.hdr").read_text() == "mine"
+
+
+def test_frames_of_a_video_are_kept_for_it_alone(tmp_path):
+    """Another video, another number of frames or a changed file is another purpose."""
+    (tmp_path / "a.mp4").write_text("a")
+    (tmp_path / "b.mp4").write_text("b")
+    prints = [fingerprint([tmp_path / name], n) for name, n in (("a.mp4", 30), ("b.mp4", 30), ("a.mp4", 10))]
+    assert len(set(prints)) == 3 and fingerprint([tmp_path / "a.mp4"], 30) == prints[0]
+    (tmp_path / "a.mp4").write_text("longer")
+    assert fingerprint([tmp_path / "a.mp4"], 30) not in prints
+
+
+def test_photos_have_names_of_their_own(tmp_path):
+    """Also where the name that one would get is another's."""
+    for i, name in enumerate(("a.png", "a.bmp", "a_png.bmp", "b.png")):
+        cv2.imwrite(str(tmp_path / name), np.full((4, 4, 3), 50 * i, np.uint8))
+    assert [photo.name for photo in find_photographs(tmp_path)] == ["a_bmp", "a_png_", "a_png", "b"]
