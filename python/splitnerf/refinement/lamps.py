@@ -43,6 +43,7 @@ COARSE = 4
 N_CENTRAL, N_TABLE = 32, 1792
 N_BEHIND, N_LOBE = 512, 256  # directions that stand for the other light and for the lobe; multiples of 32
 MIN_SIGMAS = 5.0  # by which a compact lamp must explain the pairs better
+LEAST_FACTOR = 1.15  # of its power: training takes power from a lamp that it smears, since the albedo has its shadow
 DARK = 0.02  # share of the mean light that counts as none
 
 
@@ -283,7 +284,7 @@ def compact_lamp(
     best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
     gain = contrasts.costs - contrasts.costs_left(contrasts.lamps(best.direction[None], best.radius), best.factor)[:, 0]
     at_rim = best.radius == max(RADII) or degrees_from(best.direction, lobe.direction) > FARTHEST - FINER
-    if at_rim or not gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
+    if at_rim or best.factor < LEAST_FACTOR or not gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
         return light, None
     found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
     return with_lamp(light, lobe, found), found
