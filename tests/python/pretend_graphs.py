@@ -13,6 +13,7 @@ from contextlib import nullcontext
 from typing import Any
 
 import torch
+from pretend_gpu import Stream
 from splitnerf.training import gpu_step, loop
 from torch import Tensor
 from torch.utils._python_dispatch import TorchDispatchMode, _disable_current_modes
@@ -128,16 +129,6 @@ def record(
     return graph, outputs
 
 
-class NoStream:
-    """A stream that orders nothing, as the CPU is in order."""
-
-    def __init__(self, *_) -> None:
-        pass
-
-    def wait_stream(self, other) -> None:
-        pass
-
-
 def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
     """Trainings on the CPU take graphed steps from now on; returns how many they recorded, replayed, and took without a graph
     (`called`), as it goes on."""
@@ -161,8 +152,8 @@ def graphs_on_the_cpu(monkeypatch) -> dict[str, int]:
     monkeypatch.setattr(gpu_step.GpuStep, "differentiate", counted_differentiate)
     monkeypatch.setattr(gpu_step, "record", counted_record)
     monkeypatch.setattr(loop, "Step", gpu_step.GpuStep)
-    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
+    monkeypatch.setattr(torch.cuda, "Stream", Stream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
-    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: NoStream())
+    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: Stream())
     monkeypatch.setattr(torch.cuda, "stream", lambda stream: nullcontext())
     return used

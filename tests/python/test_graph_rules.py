@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pretend_graphs
 import pytest
 import torch
-from pretend_graphs import NoStream
+from pretend_gpu import Stream
 from splitnerf.render.model import SceneModel
 from splitnerf.training import gpu_step
 from splitnerf.training.gpu_step import GpuStep, in_units
@@ -91,7 +91,7 @@ class Fake(GpuStep):
 def step(monkeypatch) -> Fake:
     pools = pretend_graphs.Pools()
     monkeypatch.setattr(gpu_step, "record", functools.partial(pretend_graphs.record, pools=pools))
-    monkeypatch.setattr(torch.cuda, "Stream", NoStream)
+    monkeypatch.setattr(torch.cuda, "Stream", Stream)
     monkeypatch.setattr(torch.cuda, "graph_pool_handle", pools.handle)
     torch.manual_seed(0)
     config = tiny(
@@ -125,6 +125,11 @@ def test_a_step_is_called_and_then_recorded_and_then_repeated(step, monkeypatch)
     assert ways(step, 1) == ["repeated"]
 
 
+def test_steps_without_a_least_weight_have_a_capacity_where_they_are_recorded(step):
+    step.model.config = step.model.config.replace({"sampling.min_weight": 0.0})
+    assert ways(step, 4) == ["called", "called", "recorded", "repeated"] and step.calls == [None, ROOM, ROOM]
+
+
 def test_without_counts_of_a_step_before_none_is_recorded(step):
     assert ways(step, 4, counts=None) == ["called"] * 4 and step.calls == [None] * 4
 
@@ -148,12 +153,14 @@ def decide(step: Fake, what: str) -> dict:
         step.mesh.made_at = 0.25
     elif what == "occlusion":
         step.model.has_mesh = True
+    elif what == "held":
+        step.is_held = lambda progress: True
     return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
         what, {}
     )
 
 
-@pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "light", "priors", "rays"])
+@pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "held", "light", "priors", "rays"])
 def test_another_decision_is_another_graph(step, what):
     ways(step, 4)
     settings = decide(step, what)

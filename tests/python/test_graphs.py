@@ -10,16 +10,12 @@ import pytest
 import torch
 from pretend_gpu import pretend_gpu
 from splitnerf.data.dataset import load_dataset
-from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
-from splitnerf.training import gpu_step, start
+from splitnerf.training import gpu_step
 from splitnerf.training import loop as trainer
 from splitnerf.training.batches import PixelSource, draw_batch
-from splitnerf.training.checkpoint import load_checkpoint
-from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
-from test_start import shape_of_ball
 from tiny_runs import lines_of, tiny, train_scene
 
 
@@ -39,30 +35,6 @@ def same_lines(folder) -> None:
     """The runs `recorded` and `called` have the same numbers but for their seconds."""
     for ours, theirs in zip(lines_of(folder / "recorded"), lines_of(folder / "called"), strict=True):
         assert ours | {"seconds": 0} == theirs | {"seconds": 0}
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {},
-        {"sparse_steps": True, "table_dtype": "bfloat16", "seed": 3},
-        {"table_dtype": "float16", "sampling.min_weight": 0.0, "grid_every": 3, "target_samples": 16384},
-    ],
-)
-def test_recorded_steps_have_the_bits_of_others(data, tmp_path, monkeypatch, recording, settings):
-    """While the light moves, levels open, meshes come, priors begin and the anneal goes on. Both have the same capacity."""
-    settings = {"target_samples": 4608, "open_below": 0.0, "indirect_every": 25, "start_levels": 1} | settings
-    config = tiny("cpu", steps=120, cuda_graphs=True, **settings)
-    for name in ("recorded", "called"):
-        (tmp_path / name).mkdir()
-    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
-    train_scene(load_dataset(data), config, tmp_path / "recorded")
-    assert recording["replayed"] > 60 and recording["recorded"] < 60
-    in_place = []
-    monkeypatch.setattr(gpu_step, "record", lambda *arguments: in_place.append(called(*arguments)) or in_place[-1])
-    train_scene(load_dataset(data), config, tmp_path / "called")
-    assert len(in_place) == recording["recorded"]
-    same_lines(tmp_path)
 
 
 class Taken(NamedTuple):
@@ -118,21 +90,6 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
         run.mkdir()
         with pretend_gpu(patch):
             return train_scene(load_dataset(data), config, run, device="cuda"), steps
-
-
-def test_a_surface_that_is_held_near_its_start_gets_the_same_bits_from_graphs(data, tmp_path, monkeypatch, recording):
-    def ball(photos, hull, config):
-        shape = shape_of_ball(16)
-        return type(shape)(shape.distance.to(hull.device), shape.trust.to(hull.device), shape.box)
-
-    monkeypatch.setattr(start, "start_shape", ball)  # the tiny photos are too few
-    runs = []
-    for name in ("recorded", "called"):
-        runs.append(schedule_of_a_gpu(data, tmp_path / name, monkeypatch, recording, **{"surface.start": "stereo"})[0])
-        monkeypatch.setattr(gpu_step, "record", called)
-    assert recording["replayed"] > 50
-    for a, b in zip(*(run.model.parameters() for run in runs), strict=True):
-        assert torch.equal(a, b)
 
 
 def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeypatch, recording):
@@ -204,28 +161,6 @@ def test_a_capacity_changes_roundings_alone(data):
             torch.testing.assert_close(padded_terms[name], value, rtol=1e-5, atol=1e-7)
     for (name, _), a, b in zip(model.named_parameters(), padded_grads, grads, strict=True):
         assert (a - b).norm() <= 1e-4 * b.norm(), name
-
-
-def test_a_step_that_exceeds_its_room_moves_nothing(data, tmp_path, monkeypatch, recording):
-    """Nor does it count."""
-    monkeypatch.setattr(gpu_step, "SHADING_SLACK", 0.2)
-    monkeypatch.setattr(gpu_step, "UNIT", 1)
-    complete, judge, moved, step = [], GpuStep.judge, [], AdamW.step
-    monkeypatch.setattr(GpuStep, "judge", lambda self, numbers: complete.append(judge(self, numbers)) or complete[-1])
-
-    def watched(self, allowed):
-        params = [p for group in self.param_groups for p in group["params"]]
-        before = [p.detach().clone() for p in params]
-        step(self, allowed=allowed)
-        moved.append(any(not torch.equal(p, b) for p, b in zip(params, before)))
-
-    monkeypatch.setattr(AdamW, "step", watched)
-    monkeypatch.setattr(trainer, "next_ray_count", lambda n_rays, *_: 96)
-    config = tiny("cpu", steps=40, cuda_graphs=True, target_samples=4608)
-    trained = train_scene(load_dataset(data), config, tmp_path)
-    assert complete.count(False) > 0 and moved == complete and trained.finished
-    stored = load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"]
-    assert max(int(moments["step"]) for moments in stored.values()) == complete.count(True)
 
 
 def test_waiting_while_recording_is_refused():
