@@ -49,7 +49,14 @@ LEFT_OUT = [
     r"core/ExceptionReplacer",
     r"core/RemoveDecorator",
 ]
-SECONDS = 300  # of the tests with one mutant
+SETTINGS = """[cosmic-ray]
+module-path = "{path}"
+timeout = 300.0
+excluded-modules = []
+test-command = "{command}"
+distributor.name = "local"
+filters.operators-filter.exclude-operators = {left_out}
+"""
 
 
 def tests_of(path: Path) -> list[str]:
@@ -81,19 +88,8 @@ def mutate(path: Path) -> tuple[int, int, list[str]]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command = " ".join([sys.executable, "-m pytest -q -x -p no:cacheprovider", *tests_of(path)])
-    lines = [
-        "[cosmic-ray]",
-        f'module-path = "{path.as_posix()}"',
-        f"timeout = {SECONDS}.0",
-        "excluded-modules = []",
-        f'test-command = "{command}"',
-        "[cosmic-ray.distributor]",
-        'name = "local"',
-        "[cosmic-ray.filters.operators-filter]",
-        f"exclude-operators = {json.dumps(LEFT_OUT)}",
-    ]
     settings, session = folder / "settings.toml", folder / "session.sqlite"
-    settings.write_text("\n".join(lines) + "\n")
+    settings.write_text(SETTINGS.format(path=path.as_posix(), command=command, left_out=json.dumps(LEFT_OUT)))
     try:
         cosmic_ray("baseline", settings)
         cosmic_ray("init", settings, session)

@@ -104,23 +104,11 @@ FAULTS = (
 def build(finder: str) -> Path:
     """Builds the tests with a sanitizer; the path of their program."""
     folder = WORK / (finder or "plain")
-    subprocess.run(
-        [
-            "cmake",
-            "-S",
-            WORK / "source",
-            "-B",
-            folder,
-            "-G",
-            "Ninja",
-            "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
-            "-DSPLITNERF_BUILD_PYTHON=OFF",
-            "-DSPLITNERF_BUILD_TESTS=ON",
-            f"-DSPLITNERF_SANITIZE={finder}",
-        ],
-        check=True,
-        stdout=subprocess.DEVNULL,
+    options = (
+        "-G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON".split()
     )
+    words = ["cmake", "-S", WORK / "source", "-B", folder, *options, f"-DSPLITNERF_SANITIZE={finder}"]
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
     subprocess.run(
         ["cmake", "--build", folder, "--target", "splitnerf_cuda_tests"], check=True, stdout=subprocess.DEVNULL
     )

@@ -218,18 +218,9 @@ class CheckpointReader(Reader):
     """Raw files, and a pickle among the parts of a valid container; what loads goes into a model and its optimiser."""
 
     def corpus(self) -> list[bytes]:
-        config = Config().replace(
-            {
-                "n_levels": 2,
-                "log2_table_size": 4,
-                "base_resolution": 2,
-                "light_resolution": 16,
-                "grid_resolution": 2,
-                "constants.surface_width": 4,
-                "constants.materials_width": 4,
-                "start_levels": 2,
-            }
-        )
+        levels = {"n_levels": 2, "start_levels": 2, "log2_table_size": 4, "base_resolution": 2, "grid_resolution": 2}
+        widths = {"constants.surface_width": 4, "constants.materials_width": 4, "light_resolution": 16}
+        config = Config().replace(levels | widths)
         model = SceneModel(config)
         optimiser = make_optimiser(model, config)
         for parameter in model.parameters():

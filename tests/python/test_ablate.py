@@ -14,16 +14,9 @@ from tiny_runs import SMALL, as_options
 
 
 def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
-    evaluation = {
-        "relight": relight and {"psnr": relight},
-        "albedo": {"psnr": 20.0},
-        "novel_view": {"psnr": novel_view},
-        "normal_mae_deg": 5.0,
-        "roughness_mae": 0.1,
-        "metallic_balanced_accuracy": None,
-        "light_psnr": 15.0,
-        "seconds": 360.0,
-    }
+    maps = {"albedo": {"psnr": 20.0}, "normal_mae_deg": 5.0, "roughness_mae": 0.1, "metallic_balanced_accuracy": None}
+    views = {"relight": relight and {"psnr": relight}, "novel_view": {"psnr": novel_view}}
+    evaluation = maps | views | {"light_psnr": 15.0, "seconds": 360.0}
     return score_of("scene", row, FULL, seed, evaluation)
 
 

@@ -59,16 +59,8 @@ def surface_of(field):
 @pytest.fixture(scope="module")
 def baked():
     vertices, faces = extract_mesh(bumpy, 1.5, 80)
-    return textured_asset(
-        "bumpy",
-        vertices,
-        faces,
-        surface_of(bumpy),
-        n_faces=600,
-        texture_size=SIZE,
-        spacing=SPACING,
-        occlusion_offset=0.01,
-    )
+    sizes = {"n_faces": 600, "texture_size": SIZE, "spacing": SPACING, "occlusion_offset": 0.01}
+    return textured_asset("bumpy", vertices, faces, surface_of(bumpy), **sizes)
 
 
 def angle(a, b):

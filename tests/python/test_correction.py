@@ -4,11 +4,12 @@ import pytest
 import torch
 import trimesh
 from mesh_shapes import traced
-from op_checks import generator, unit
+from op_checks import generator, rand, unit
 from splitnerf.fields.occlusion import bit_counts
+from splitnerf.ops import ShadingSubset
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
-from splitnerf.render.renderer import find_samples, render_rays
+from splitnerf.render.renderer import MIN_OPACITY, add_corrections, find_samples, render_rays
 from splitnerf.training.batches import Batch, draw_numbers, make_probes, probe_counts
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
@@ -59,6 +60,7 @@ def test_the_sum_comes_in_smoothly_over_its_band():
                 light, *points_at(roughness, split), candidates, None if n is None else torch.tensor(n)
             )
             found.append(torch.zeros(8, 3).index_add(0, at, correction))
+            assert n is not None or (expected[at] > 0).all()  # others are left out
         share = (found[0] - found[1])[:, 0]
         counted = torch.zeros(8).index_fill(0, candidates[: n or 7], 1.0)
         torch.testing.assert_close(share, expected * counted, rtol=0, atol=1e-5)
@@ -145,6 +147,22 @@ def test_a_corrected_picture_moves_all_its_parts():
     light.backward()
     for name, p in model.named_parameters():
         assert p.grad.isfinite().all() and (p.grad != 0).any(), name
+
+
+def test_a_correction_counts_by_the_share_of_its_segment():
+    """Three rays of 100 samples with every second one shaded, in segments of 1 to 5; two samples of one ray are corrected."""
+    shaded, rays = torch.arange(0, 300, 2), torch.arange(300) // 100
+    segment = torch.repeat_interleave(torch.arange(50), torch.tensor([1, 2, 5, 3, 4]).repeat(10))
+    shares, opacity, mean, correction = rand(150, seed=1), rand(4, seed=2), rand(4, 3), rand(5, 3, seed=4)
+    opacity[2], at, none = 1e-9, torch.tensor([7, 120, 0, 9, 149]), torch.zeros(0)
+    spread = ShadingSubset(shaded, none, none, none, none, torch.zeros(50), segment, none)
+    expected = mean.clone()
+    for k, added in zip(at.tolist(), correction):
+        ray = rays[shaded[k]]
+        expected[ray] += added * shares[segment == segment[k]].sum() / opacity[ray].clamp(min=MIN_OPACITY)
+    torch.testing.assert_close(
+        add_corrections(mean, correction, at, spread, rays, shares, opacity), expected, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_rays_are_weighed_by_the_cosine_they_are_told():

@@ -305,17 +305,13 @@ def test_a_cap_keeps_its_places_and_normals():
     def leaning(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
         return 0.5 + 0.5 * x[:, 2:].expand(-1, 3), *surface.materials(x)[1:3], surface.gradient(x)[1]
 
-    found = textured_asset(
-        "ball",
+    vertices, faces, leans = (
         np.float32(mesh.vertices),
         np.int32(mesh.faces),
         dataclasses.replace(surface, materials=leaning),
-        n_faces=0,
-        texture_size=128,
-        spacing=0.05,
-        occlusion_offset=0.01,
-        on_surface=mesh.vertices[:, 2] > 0,
-    ).asset
+    )
+    sizes = {"n_faces": 0, "texture_size": 128, "spacing": 0.05, "occlusion_offset": 0.01}
+    found = textured_asset("ball", vertices, faces, leans, **sizes, on_surface=mesh.vertices[:, 2] > 0).asset
     radius, up = np.linalg.norm(found.vertices, axis=1), found.vertices[:, 2]
     assert radius[up > 0.1] == pytest.approx(0.8, abs=1e-4) and radius[up < -0.01] == pytest.approx(0.82, abs=1e-6)
     tilt = (found.normals * found.vertices).sum(1) / radius

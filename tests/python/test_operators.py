@@ -325,23 +325,14 @@ BY_POINT = (
 ).split()
 NONE_3, NONE, LONG = torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, dtype=torch.int64)
 NO_SAMPLE, HALF_AND_NONE = torch.zeros(3, dtype=torch.int64), torch.tensor([0.5, 0.0])
-CELLS = torch.ones(4, 4, 4, dtype=torch.uint8)
+CELLS, TWO_RAYS = torch.ones(4, 4, 4, dtype=torch.uint8), torch.eye(3)[:2]
 # The others without a point, or without a sample on two rays.
 EMPTY = {
     "light_queries": lambda t: query_inputs("cpu", t, True, 0),
     "march_rays": lambda t: (NONE_3, NONE_3, NONE, CELLS, 1.5, 0.1, 64),
     "sample_rays": lambda t: (NONE_3, NONE_3, NONE, *CASES["sample_rays"](torch.float32)[3:]),
     "draw_rays": lambda t: (NONE, 0, *CASES["draw_rays"](torch.float32)[2:]),
-    "surface_weights": lambda t: (
-        NONE,
-        NONE_3,
-        torch.eye(3)[:2],
-        *torch.tensor([9.0]),
-        NO_SAMPLE,
-        *HALF_AND_NONE,
-        0.0,
-        -1,
-    ),
+    "surface_weights": lambda t: (NONE, NONE_3, TWO_RAYS, *torch.tensor([9.0]), NO_SAMPLE, *HALF_AND_NONE, 0.0, -1),
     "composite": lambda t: (NONE, NONE_3, NO_SAMPLE, HALF_AND_NONE, 0.1),
     "spread_samples": lambda t: (NONE, NONE, NO_SAMPLE, HALF_AND_NONE, 1.0, 2),
     "interpolate": lambda t: (torch.ones(2, 3), LONG, LONG, NONE),

@@ -31,15 +31,9 @@ WHITE = torch.ones(4, 8, 3)
 def plain_surface(mesh: trimesh.Trimesh, roughness: float = 1.0, metallic: float = 0.0) -> TexturedSurface:
     """A white mesh whose normals are the triangles'."""
     n = len(mesh.vertices)
-    return TexturedSurface(
-        scene_of(mesh),
-        torch.zeros(n, 3),
-        torch.zeros(n, 4),
-        torch.zeros(n, 2),
-        torch.ones(1, 1, 3),
-        torch.tensor([[[roughness, metallic]]]),
-        torch.tensor([[[0.0, 0.0, 1.0]]]),
-    )
+    of_vertices = (torch.zeros(n, k) for k in (3, 4, 2))
+    gloss, up = torch.tensor([[[roughness, metallic]]]), torch.tensor([[[0.0, 0.0, 1.0]]])
+    return TexturedSurface(scene_of(mesh), *of_vertices, torch.ones(1, 1, 3), gloss, up)
 
 
 def under_a_roof() -> trimesh.Trimesh:
@@ -51,15 +45,8 @@ def flat_points(n: int, n_dot_v: float = 0.8) -> dict[str, torch.Tensor]:
     """n times the origin on a floor that faces up, white and rough."""
     up = torch.tensor([0.0, 0.0, 1.0]).repeat(n, 1)
     view = torch.tensor([math.sqrt(1 - n_dot_v**2), 0.0, n_dot_v]).repeat(n, 1)
-    return {
-        "positions": 0 * up,
-        "geometric_normals": up,
-        "normals": up,
-        "view_dirs": view,
-        "albedo": torch.ones(n, 3),
-        "roughness": torch.ones(n, 1),
-        "metallic": torch.zeros(n, 1),
-    }
+    white = {"albedo": torch.ones(n, 3), "roughness": torch.ones(n, 1), "metallic": torch.zeros(n, 1)}
+    return {"positions": 0 * up, "geometric_normals": up, "normals": up, "view_dirs": view} | white
 
 
 def furnished_corner() -> Asset:

@@ -134,6 +134,7 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
         assert torch.equal(padded.positions[n + more :], bare.positions[n:])
         assert torch.equal(padded.positions[n : n + more], bare.positions[torch.arange(more) % n])
         assert torch.equal(padded.beside, bare.beside) and bare.beside.tolist() == [0, n // 2, int(0.999 * n)]
+        assert not padded.directions[n:].any()
         ray, expected = rendered(model, padded, shades_per_ray=2), rendered(model, bare, shades_per_ray=2)
         torch.testing.assert_close((ray.mean, ray.opacity), (expected.mean, expected.opacity))
         assert torch.equal(ray.gradients[n + more :], expected.gradients[n:]) and (ray.weights[n:] == 0).all()
@@ -141,6 +142,8 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
     assert torch.equal(cut.positions[: n - 1], bare.positions[: n - 1]) and len(cut.directions) == n - 1
     assert int(cut.n_found) == n
     empty = torch.full_like(cells, CELL_EMPTY)
+    nothing = find_samples(model, empty, *rays, probes=probes)
+    assert torch.equal(nothing.positions, probes.anywhere) and len(nothing.directions) == len(nothing.beside) == 0
     nothing = find_samples(model, empty, *rays, probes=probes, capacity=4)
     assert (nothing.positions[:4] == 0).all() and torch.equal(nothing.positions[4:9], probes.anywhere)
     assert not nothing.beside.any()

@@ -58,11 +58,5 @@ def camera_of(width, height, **changes):
     """A camera 3 above the triangle's plane that sees all of it, for JSON."""
     pose = looking(-np.pi / 2, 0.0) + np.array([[0, 0, 0, 0.4], [0, 0, 0, 0], [0, 0, 0, 0.4], [0, 0, 0, 0]])
     lens = [1.5 * width, 1.5 * width, width / 2, height / 2]
-    return {
-        "pose": pose.ravel().tolist(),
-        "intrinsics": lens,
-        "width": width,
-        "height": height,
-        "turn": 0,
-        "lights": [0],
-    } | changes
+    seen = {"pose": pose.ravel().tolist(), "intrinsics": lens, "width": width, "height": height}
+    return seen | {"turn": 0, "lights": [0]} | changes
