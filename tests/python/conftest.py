@@ -1,7 +1,5 @@
 """What tests of several files share: tiny data sets and runs, and a painted ball."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Training steps that are recorded and repeated, on a CPU that pretends to."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -71,22 +69,12 @@ def schedule_of_a_gpu(data, run, monkeypatch, used, **settings) -> tuple[trainer
 
     with monkeypatch.context() as patch:
         patch.setattr(trainer.Training, "advance", watched)
-        patch.setattr(
-            SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True)
-        )  # which step takes it is no chance
+        # which step takes it is no chance
+        patch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))
         patch.setattr(SceneModel, "use_mesh", leaving)
-        config = tiny(
-            "fast",
-            steps=160,
-            cuda_graphs=True,
-            target_samples=4608,
-            open_below=0.0,
-            start_levels=1,
-            indirect_every=25,
-            preview_every=1.0,
-            checkpoint_minutes=1e3,
-            **settings,
-        )
+        surface = {"target_samples": 4608, "open_below": 0.0, "start_levels": 1, "indirect_every": 25}
+        seldom = {"preview_every": 1.0, "checkpoint_minutes": 1e3}
+        config = tiny("fast", steps=160, cuda_graphs=True, **surface, **seldom, **settings)
         run.mkdir()
         with pretend_gpu(patch):
             return train_scene(load_dataset(data), config, run, device="cuda"), steps
@@ -98,16 +86,14 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
     recorded it gives the same bits."""
     trained, steps = schedule_of_a_gpu(data, tmp_path / "recorded", monkeypatch, recording)
     assert trained.finished and all(p.isfinite().all() for p in trained.model.parameters())
-    at = next(
-        i for i, step in enumerate(steps) if step.skipped
-    )  # the first step that read of one that was not complete
+    # the first step that read of one that was not complete
+    at = next(i for i, step in enumerate(steps) if step.skipped)
     assert 57 < at <= 57 + gpu_step.READ_EVERY and [step.how for step in steps[at : at + 2]] == ["recorded", "called"]
     assert [steps[i].skipped for i in (at - 1, at, at + 1, 159)] == [0, 1, 2, 2]
     assert len({step.made_at for step in steps}) == 10 and len(steps) == 160
     rays = [step.n_rays for step in steps]
-    assert (
-        not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3
-    )  # none goes to and fro
+    # none goes to and fro
+    assert not any(a == c != b for a, b, c in zip(rays, rays[1:], rays[2:])) and len(set(rays[80:])) <= 3
     # A kind of steps is called, then recorded, and recorded anew where the graph has too little capacity.
     assert recording["recorded"] <= steps[-1].n_kinds and recording["called"] <= steps[-1].n_kinds + 15
     assert [step.how for step in steps].count("replayed") > 70
@@ -122,16 +108,8 @@ def test_a_whole_schedule_runs_through_graphs_to_its_end(data, tmp_path, monkeyp
 def test_a_capacity_changes_roundings_alone(data):
     """Losses and gradients of one step with capacity for more of everything, against those with none."""
     dataset = load_dataset(data)
-    config = tiny(
-        "cpu",
-        open_below=0.0,
-        n_levels=6,
-        target_samples=3000,
-        initial_variance=0.4,
-        eikonal_weight=0.0,
-        entropy_weight=0.0,
-        shape_priors_until=1.0,
-    )
+    weights = {"eikonal_weight": 0.0, "entropy_weight": 0.0, "shape_priors_until": 1.0}
+    config = tiny("cpu", open_below=0.0, n_levels=6, target_samples=3000, initial_variance=0.4, **weights)
     model = SceneModel(config)
     generator = torch.Generator().manual_seed(0)
     source = PixelSource(dataset, 0.85, generator)

@@ -1,7 +1,5 @@
 """Scenes with a known answer, from images to files: a ball under one lamp, and hollow shapes."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -96,18 +94,9 @@ def result(tmp_path_factory) -> Result:
         Image.fromarray(np.rint(255 * picture(pose)).astype(np.uint8)).save(root / f"r_{i}.png")
         frames.append({"file_path": f"./r_{i}", "transform_matrix": pose.tolist()})
     (root / "transforms_train.json").write_text(json.dumps({"camera_angle_x": ANGLE, "frames": frames}))
-    config = tiny(
-        steps=360,
-        warmup_steps=20,
-        target_samples=2048,
-        max_rays=256,
-        log2_table_size=12,
-        export_resolution=48,
-        export_faces=1500,
-        export_texture_size=128,
-        preview_every=2.0,
-        mesh_every=0.5,
-    )
+    sizes = {"target_samples": 2048, "max_rays": 256, "log2_table_size": 12, "preview_every": 2.0, "mesh_every": 0.5}
+    exported = {"export_resolution": 48, "export_faces": 1500, "export_texture_size": 128}
+    config = tiny(steps=360, warmup_steps=20, **sizes, **exported)
     dataset = load_dataset(root)
     trained = train_scene(dataset, config, root)
     write_assets(root, trained.model, dataset.box_from_world, Cameras.of(dataset))

@@ -1,7 +1,5 @@
 """A user's own files are never lost: the program deletes and replaces what it can show to be its own."""
 
-from __future__ import annotations
-
 import shutil
 
 import cv2

@@ -1,7 +1,5 @@
 """What a run brings up to date and when, by which seed it draws, and what its log and its end hold."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

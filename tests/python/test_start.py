@@ -1,7 +1,5 @@
 """The shape that a training starts from: depths by stereo, what they carve, and the surface that is held near it."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Training as a user runs it: files, exit codes, resume, interruption, observers."""
 
-from __future__ import annotations
-
 import json
 import signal
 from types import SimpleNamespace
@@ -174,20 +172,8 @@ def test_bad_options_exit_with_2(data, tmp_path, capsys, options, word):
 def test_the_paper_preset_takes_steps(data, tmp_path):
     """The published widths and levels, with few samples: every one of its switches runs."""
     run = tmp_path / "run"
-    settings = dict(
-        target_samples=2048,
-        initial_rays=32,
-        light_samples=128,
-        light_queries=64,
-        mesh_resolution=32,
-        export_resolution=32,
-        grid_resolution=32,
-        log2_table_size=14,
-        mesh_every=0.3,
-        preview_every=1.0,
-        export_texture_size=64,
-        export_faces=500,
-    )
+    smaller = {name: size for name, size in SMALL.items() if name != "n_levels"}
+    settings = smaller | {"log2_table_size": 14, "mesh_every": 0.3, "preview_every": 1.0}
     command = ["train", str(data), "--out", str(run), "--preset", "paper", "--steps", "6", "--downscale", "2"]
     assert main([*command, *as_options(settings)]) == DONE
     assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())
@@ -227,9 +213,8 @@ def test_observers_learn_of_all_that_happens(data, tmp_path):
     period = light_period(config)  # steps that share gradients of the light, and are not parted
     reconstruct(data, tmp_path / "run", config, observer=together([asking, second]))
     heard = asking.heard
-    assert heard[0] == ("begun", 0) and [event for event in heard if event[0] == "step"] == [
-        ("step", n) for n in range(period, 41, period)
-    ]
+    assert heard[0] == ("begun", 0)
+    assert [event for event in heard if event[0] == "step"] == [("step", n) for n in range(period, 41, period)]
     assert [event[1] for event in heard if event[0] == "logged"] == [
         line["step"] for line in lines_of(tmp_path / "run")
     ]

@@ -3,8 +3,6 @@
 python tests/python/test_walk.py    lists them
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections import Counter

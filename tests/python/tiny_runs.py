@@ -1,7 +1,5 @@
 """Runs small enough that a step takes milliseconds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -13,24 +11,10 @@ from splitnerf.training.loop import Training
 from splitnerf.training.observer import NOBODY, Observer
 
 # A tenth of the default sizes and less; the method is that of the preset.
-SMALL = dict(
-    n_levels=4,
-    log2_table_size=10,
-    target_samples=512,
-    initial_rays=64,
-    grid_resolution=16,
-    light_resolution=16,
-    light_samples=64,
-    light_queries=16,
-    eikonal_points=32,
-    mesh_resolution=24,
-    export_resolution=32,
-    export_faces=500,
-    export_texture_size=64,
-    cuda_graphs=False,
-    **{"refinement.enabled": False},
-    **{"surface.start": "sphere"},
-)
+SMALL = dict(n_levels=4, log2_table_size=10, target_samples=512, initial_rays=64, grid_resolution=16)
+SMALL |= dict(light_resolution=16, light_samples=64, light_queries=16, eikonal_points=32, mesh_resolution=24)
+SMALL |= dict(export_resolution=32, export_faces=500, export_texture_size=64, cuda_graphs=False)
+SMALL |= {"refinement.enabled": False, "surface.start": "sphere"}
 
 
 def tiny(name: str = "cpu", **settings: object) -> Config:
