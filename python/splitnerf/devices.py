@@ -179,12 +179,12 @@ def in_background(function: Callable, *args: object) -> Future:
     """Calls a function in a thread of its own, which ends with the program; the future holds its result or
     exception."""
     future = Future()
-    threading.Thread(target=_fulfil, args=(future, function, *args), daemon=True).start()
+
+    def work() -> None:
+        try:
+            future.set_result(function(*args))
+        except BaseException as error:  # the thread that reads the result raises it
+            future.set_exception(error)
+
+    threading.Thread(target=work, daemon=True).start()
     return future
-
-
-def _fulfil(future: Future, function: Callable, *args: object) -> None:
-    try:
-        future.set_result(function(*args))
-    except BaseException as error:  # the thread that reads the result raises it
-        future.set_exception(error)

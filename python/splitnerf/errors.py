@@ -1,4 +1,4 @@
-"""What the user is told: errors, which the command line turns into exit codes, and notes, which do not stop the work."""
+"""Messages to the user: errors, which the command line turns into exit codes, and notes, which do not stop the work."""
 
 from __future__ import annotations
 

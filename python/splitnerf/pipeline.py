@@ -202,13 +202,9 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
 
 
 def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observer: Observer) -> bool:
-    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained. Photos or an
-    asset that it cannot use leave it out, with a note; the run then delivers what training exported, as where it raises
-    RuntimeError for numbers that are no longer finite.
-
-    Returns:
-        False where it was interrupted.
-    """
+    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained; returns False
+    where it was interrupted. Where photos or asset cannot be used, or numbers are no longer finite (RuntimeError), the
+    run delivers what training exported."""
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
     observer(Event("refinement", path=run / TRAINED))

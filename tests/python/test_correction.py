@@ -181,10 +181,10 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     step, g = Step(model, grid, SurfaceMesh(model), generator(3)), generator(4)
     rays = torch.tensor([[4.0, 0.01 * i, 0] for i in range(30)]), torch.tensor([[-1.0, 0, 0]] * 30)
     jitter = torch.rand(30, generator=g)
-    pixels = torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g), torch.zeros(30, dtype=torch.bool)
-    photo = torch.zeros(30, dtype=torch.int64), torch.ones(30, 3)
+    target, background = torch.rand(30, 4, generator=g), torch.rand(30, 3, generator=g)
+    photo = target, torch.zeros(30, dtype=torch.int64), torch.ones(30, 3), background, torch.zeros(30, dtype=torch.bool)
     probes = make_probes(model.config, *draw_numbers(g, probe_counts(model.config)))
-    batch = Batch(*rays, *pixels, jitter, jitter, *photo, probes)
+    batch = Batch(*rays, *photo, jitter, jitter, probes)
     gradients = []
     for _ in range(2):
         ray, _ = step.gradients(batch, model.evaluate_light(), 1, 0.0)

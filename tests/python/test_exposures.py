@@ -16,7 +16,7 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import exposed_like
 from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
 from splitnerf.training import exposure
-from splitnerf.training.batches import DrawnRays, EdgePixels, draw_batch
+from splitnerf.training.batches import draw_batch, edge_runs
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
 from tiny_runs import tiny, train
 
@@ -125,11 +125,11 @@ class TestLoss:
     def batch(self, exposure: float, edges=None, balance=(1.0, 1.0, 1.0), **changes):
         target = torch.tensor([[0.5, 0.6, 1.0, 1.0]])
         first = torch.zeros(1, dtype=torch.int64)
-        runs = EdgeRuns.none(CPU) if edges is None else edges.runs
+        runs = EdgeRuns.none(CPU) if edges is None else edges
 
         def draw(n, random, backgrounds, exposures):
             pixels, *beside = read_pixels(target, first, first, exposures, backgrounds, runs)
-            return DrawnRays(target[:, :3], target[:, :3], pixels, first, *beside)
+            return target[:, :3], target[:, :3], pixels, first, *beside
 
         source = SimpleNamespace(generator=torch.Generator().manual_seed(0), draw=draw)
         return draw_batch(source, 1, tiny(**changes), torch.full((1, 3), exposure) * torch.tensor(balance))
@@ -146,7 +146,7 @@ class TestLoss:
 
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
         """And so is what lies behind the object at the masks' edges."""
-        edges = EdgePixels([((np.array([0]), np.array([1])), np.uint8([[51, 76, 102]]))], 1, CPU)
+        edges = edge_runs([((np.array([0]), np.array([1])), np.uint8([[51, 76, 102]]))], 1, CPU)
         balance = np.float32([0.8, 1.2, 1.1])
         batch = self.batch(0.5, edges, balance.tolist(), compositing="srgb", **{"shading.method": "split"})
         assert torch.equal(batch.exposure, torch.ones(1, 3)) and batch.whole.item()

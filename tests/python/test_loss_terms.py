@@ -32,9 +32,8 @@ def rendered():
     background, jitter = torch.rand(n, 3, generator=g), torch.rand(n, generator=g)
     photo = torch.zeros(n, dtype=torch.int64), torch.ones(n, 3)
     probes = make_probes(config, *draw_numbers(g, probe_counts(config)))
-    batch = Batch(
-        origins, directions, target, background, torch.zeros(n, dtype=torch.bool), jitter, jitter, *photo, probes
-    )
+    whole = torch.zeros(n, dtype=torch.bool)
+    batch = Batch(origins, directions, target, *photo, background, whole, jitter, jitter, probes)
     light = model.evaluate_light()
     ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)

@@ -73,8 +73,9 @@ def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
         assert behind.any() and not behind.all()
         colours = spread.interpolate(behind[:, None].double())[:, 0]
         assert colours.tolist() == [0, 0, 0, 1, 1]
-        assert behind[spread.leaders].tolist() == [False, True] and spread.stretch.tolist() == behind.long().tolist()
-        assert (weights[spread.shaded[spread.leaders]][spread.stretch] >= weights[spread.shaded]).all()
+        assert behind[spread.representatives].tolist() == [False, True]
+        assert spread.segment.tolist() == behind.long().tolist()
+        assert (weights[spread.shaded[spread.representatives]][spread.segment] >= weights[spread.shaded]).all()
         assert weights[spread.shaded[spread.heaviest]].tolist() == [0.3]
     assert spread_samples(weights, samples, 0, phase[None], gap=0.15).shaded.tolist() == [0, 1, 2, 3, 4]
 
@@ -82,20 +83,21 @@ def test_a_second_surface_has_a_sample_and_a_colour_of_its_own():
 def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
     weights, samples, phase = packed_samples()
     free = spread_samples(weights, samples, 2, phase, 0.3)
-    n_shaded, n_rays, n_stretches = free.sizes.tolist()
-    assert (n_shaded, n_rays, n_stretches) == (len(free.shaded), len(free.heaviest), len(free.leaders)) and n_rays == 49
+    n_shaded, n_rays, n_segments = free.sizes.tolist()
+    assert (n_shaded, n_rays, n_segments) == (len(free.shaded), 49, len(free.representatives))
     longer = torch.cat([weights, weights.new_full((9,), 5.0)])
     padded = PackedSamples(*(torch.cat([x, x[:9]]) for x in samples[:3]), samples.offsets)
     unit = torch.tensor(0.1, dtype=weights.dtype)
     roomy = spread_samples(longer, padded, 2, phase, 3.0, capacity=(300, 250), unit=unit)
-    assert (len(roomy.shaded), len(roomy.stretch), len(roomy.leaders), len(roomy.heaviest)) == (300, 300, 250, 50)
+    lengths = [len(x) for x in (roomy.shaded, roomy.segment, roomy.representatives, roomy.heaviest)]
+    assert lengths == [300, 300, 250, 50]
     assert roomy.sizes.tolist() == free.sizes.tolist()
     for name, short in free._asdict().items():
         long = getattr(roomy, name)
         torch.testing.assert_close(long[: len(short)], short)
         assert (long[len(short) :] >= 0).all(), name
     assert not any(x[len(weights) :].any() for x in (roomy.first, roomy.second, roomy.share))
-    assert max(roomy.leaders.max(), roomy.heaviest.max()) < 300 and roomy.stretch.max() < 250
+    assert max(roomy.representatives.max(), roomy.heaviest.max()) < 300 and roomy.segment.max() < 250
     assert roomy.shaded.max() < len(weights) and roomy.shaded[n_shaded:].unique().numel() > 20
     values = torch.randn(300, 3, generator=generator(), dtype=weights.dtype)
     torch.testing.assert_close(roomy.interpolate(values)[: len(weights)], free.interpolate(values[:n_shaded]))
@@ -104,12 +106,13 @@ def test_room_that_is_given_holds_the_same_and_what_counts_for_nothing():
 
 def test_too_little_room_is_told_and_indices_stay_in_range():
     weights, samples, phase = packed_samples()
-    n_shaded, _, n_stretches = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
-    for capacity in ((n_shaded - 1, n_stretches), (n_shaded, n_stretches - 1), (1, 1)):
+    n_shaded, _, n_segments = spread_samples(weights, samples, 2, phase, 0.3).sizes.tolist()
+    for capacity in ((n_shaded - 1, n_segments), (n_shaded, n_segments - 1), (1, 1)):
         spread = spread_samples(weights, samples, 2, phase, 0.3, capacity=capacity)
-        assert spread.sizes.tolist() == [n_shaded, 49, n_stretches]
-        assert spread.interpolate(weights.new_ones(capacity[0], 1)).eq(1).all() and spread.stretch.max() < capacity[1]
-        assert max(spread.leaders.max(), spread.heaviest.max()) < capacity[0] and spread.shaded.max() < len(weights)
+        assert spread.sizes.tolist() == [n_shaded, 49, n_segments]
+        assert spread.interpolate(weights.new_ones(capacity[0], 1)).eq(1).all() and spread.segment.max() < capacity[1]
+        assert max(spread.representatives.max(), spread.heaviest.max()) < capacity[0]
+        assert spread.shaded.max() < len(weights)
     check_error(
         lambda: lib.spread_samples(weights, samples.middles, samples.offsets, phase, 0.3, 2, 5), "max_stretches"
     )

@@ -15,7 +15,7 @@ from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.ops import EdgeRuns, read_pixels
 from splitnerf.render.rays import image_rays
-from splitnerf.training.batches import DrawnRays, EdgePixels, PixelSource, band, draw_batch, edge_of, filled_in
+from splitnerf.training.batches import PixelSource, band, draw_batch, edge_of, edge_runs, filled_in
 from tiny_runs import tiny
 
 HEIGHT, WIDTH = 20, 32
@@ -127,17 +127,17 @@ def test_directions_are_not_rounded_to_tensor_cores(dataset):
 # ---- what is drawn beside them ----
 
 
-def drawn(seed: int = 0, edges: EdgePixels | None = None, **settings):
+def drawn(seed: int = 0, edges: EdgeRuns | None = None, **settings):
     """A batch whose origins are 1, directions 2 and pixels 3, which are the first ones of three photos, exposed by 1, 2 and 3."""
     config = tiny(box=1.3, eikonal_points=4000, smoothness_points=3000, smoothness_radius=0.05, **settings)
-    runs = EdgeRuns.none(torch.device("cpu")) if edges is None else edges.runs
+    runs = EdgeRuns.none(torch.device("cpu")) if edges is None else edges
 
-    def draw(n: int, random: torch.Tensor, backgrounds: torch.Tensor, exposures: torch.Tensor) -> DrawnRays:
+    def draw(n: int, random: torch.Tensor, backgrounds: torch.Tensor, exposures: torch.Tensor) -> tuple:
         assert random.shape == (n,) and 0 <= random.min() < 0.01 and 0.99 < random.max() < 1
         pixels, *beside = read_pixels(
             torch.full((n, 4), 3.0), torch.arange(n), torch.arange(n) % 3, exposures, backgrounds, runs
         )
-        return DrawnRays(torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), pixels, torch.arange(n) % 3, *beside)
+        return torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), pixels, torch.arange(n) % 3, *beside
 
     source = SimpleNamespace(generator=torch.Generator().manual_seed(seed), draw=draw)
     return draw_batch(source, 2000, config, torch.tensor([[1.0], [2.0], [3.0]]).repeat(1, 3))
@@ -172,7 +172,7 @@ def test_whole_pixels_are_seen_before_what_lies_behind_them():
     """And all others before random colours, which do not change by that."""
     numbers, behind = torch.tensor([0, 7, 8, 1999]), np.arange(12, dtype=np.uint8).reshape(4, 3)
     runs = np.array([0, 7, 1999]), np.array([1, 9, 2000])
-    batch, plain = drawn(edges=EdgePixels([(runs, behind)], 2000, torch.device("cpu"))), drawn()
+    batch, plain = drawn(edges=edge_runs([(runs, behind)], 2000, torch.device("cpu"))), drawn()
     assert torch.equal(batch.whole.nonzero()[:, 0], numbers) and not plain.whole.any()
     torch.testing.assert_close(batch.background[numbers], torch.from_numpy(behind) / 255)
     assert torch.equal(batch.background[~batch.whole], plain.background[~batch.whole])
@@ -279,21 +279,22 @@ def test_pixels_are_found_by_their_numbers(tmp_path, dtype):
     expected = np.stack([band(image[..., 3], 2)[0] for image in images])
     index = torch.randperm(4 * 40 * 60, generator=generator())
     view, random = index // (40 * 60), torch.rand(len(index), 3)
-    _, _, behind, whole = source.pixels.read(index, view, torch.ones(4, 3), random, source.edges.runs)
-    assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()]) and len(source.edges) == expected.sum() > 0
+    _, _, behind, whole = source.pixels.read(index, view, torch.ones(4, 3), random, source.edges)
+    assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()])
+    assert len(source.edges.behind) == expected.sum() > 0
     torch.testing.assert_close(behind[whole], (torch.tensor(grey)[view] / 255)[whole, None].expand(-1, 3))
     assert torch.equal(behind[~whole], random[~whole])
 
 
 def test_a_source_has_edges_where_photos_are_whole_and_masks_have_edges(tmp_path):
     images = photo(square(), 0.9, np.full((40, 60), 0.25))[None]
-    assert len(PixelSource(scene(tmp_path, images), 0.5, generator(), 2).edges) > 0
-    assert PixelSource(scene(tmp_path, images), 0.5, generator()).edges is None
+    assert len(PixelSource(scene(tmp_path, images), 0.5, generator(), 2).edges.behind) > 0
+    assert len(PixelSource(scene(tmp_path, images), 0.5, generator()).edges.behind) == 0
     full = np.ones_like(images)
-    assert PixelSource(scene(tmp_path, full), 0.5, generator(), 2).edges is None
+    assert len(PixelSource(scene(tmp_path, full), 0.5, generator(), 2).edges.behind) == 0
     cut_out = scene(tmp_path, images)
     cut_out.whole = False
-    assert PixelSource(cut_out, 0.5, generator(), 2).edges is None
+    assert len(PixelSource(cut_out, 0.5, generator(), 2).edges.behind) == 0
 
 
 def test_photos_with_masks_of_their_own_are_whole(tmp_path):

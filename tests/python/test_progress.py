@@ -13,7 +13,7 @@ from splitnerf.cli import BAD_INPUT
 from splitnerf.data.dataset import load_dataset
 from splitnerf.progress import Interrupt, Progress
 from splitnerf.training.loop import Training
-from splitnerf.training.tensorboard import TensorBoard
+from splitnerf.training.observer import TensorBoard
 from tiny_runs import lines_of, tiny, train
 
 

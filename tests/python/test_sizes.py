@@ -99,23 +99,23 @@ def test_averages_have_whole_blocks_of_each_photo_alone(mixed, downscale):
 def test_rays_are_drawn_within_the_photos_through_their_own_lenses(mixed):
     photos = load_dataset(mixed)
     source = PixelSource(photos, 0.5, torch.Generator().manual_seed(0))
-    drawn = source.draw(4000)
-    pose, lens = source.poses[drawn.view], source.intrinsics[drawn.view]
-    local = (pose[:, :3, :3].transpose(1, 2) @ drawn.rays_d[..., None])[..., 0]
+    rays_o, rays_d, shown, view, *_ = source.draw(4000)
+    pose, lens = source.poses[view], source.intrinsics[view]
+    local = (pose[:, :3, :3].transpose(1, 2) @ rays_d[..., None])[..., 0]
     x, y = lens[:, 2] - lens[:, 0] * local[:, 0] / local[:, 2], lens[:, 3] + lens[:, 1] * local[:, 1] / local[:, 2]
-    sizes = torch.from_numpy(photos.sizes)[drawn.view]
+    sizes = torch.from_numpy(photos.sizes)[view]
     assert (x > 0).all() and (y > 0).all() and (x < sizes[:, 1]).all() and (y < sizes[:, 0]).all()
-    pixels = torch.from_numpy(np.stack(list(photos.images)))[drawn.view, y.long(), x.long()]
-    assert torch.equal(pixels, drawn.pixels)
+    pixels = torch.from_numpy(np.stack(list(photos.images)))[view, y.long(), x.long()]
+    assert torch.equal(pixels, shown)
     again, directions = pixel_rays(pose, lens, x, y)
-    assert torch.allclose(directions, drawn.rays_d, atol=1e-5) and torch.equal(again, drawn.rays_o)
-    corners = {(int(view), int(row), int(column)) for view, row, column in zip(drawn.view, y, x)}
+    assert torch.allclose(directions, rays_d, atol=1e-5) and torch.equal(again, rays_o)
+    corners = {(int(v), int(row), int(column)) for v, row, column in zip(view, y, x)}
     assert any(row >= 30 and photos.sizes[view][0] == SIZE for view, row, _ in corners)
 
 
 def test_the_hull_is_that_of_the_whole_photos(square, mixed, tmp_path):
     """What lies beside a photo says nothing: only by the box's corners less is carved."""
-    grids = [Training(load_dataset(root), tiny(), tmp_path, torch.device("cpu")).hull for root in (square, mixed)]
+    grids = [Training(load_dataset(root), tiny(), tmp_path, torch.device("cpu")).grid.hull for root in (square, mixed)]
     assert (grids[0] & ~grids[1]).sum() == 0  # nothing more is carved
     axis = torch.linspace(-1, 1, 2 * len(grids[0]) + 1)[1::2] * tiny().constants.box
     near = axis[:, None, None] ** 2 + axis[None, :, None] ** 2 + axis**2 < 1.3**2

@@ -156,7 +156,7 @@ def asked_by_shade(**settings) -> tuple:
 
 
 def test_occlusion_is_asked_on_the_surface_on_the_viewers_side():
-    """At x - n f(x), whichever way the normal looks, about the viewer's side of it and the lobe's axis, once a stretch."""
+    """At x - n f(x), whichever way the normal looks, about the viewer's side of it and the lobe's axis, once a segment."""
     points, (_, x, n, lobe_dirs, roughness, given), segments, normals, views, positions, outputs, _ = asked_by_shade()
     torch.testing.assert_close(x, positions - normals * outputs[:, :1])
     side = (normals * views).sum(1, keepdim=True).sign()

@@ -283,14 +283,14 @@ def test_factors_are_those_of_the_cache_under_the_light_that_is_kept(n_channels,
 
 
 def test_a_segment_has_the_factors_of_its_leader():
-    """Whatever the numbers of the leaders, and in whatever order the segments come."""
+    """Whatever the numbers of the representatives, and in whatever order the segments come."""
     mesh = dented()
     bits, points = bits_on(mesh), points_on(mesh)
-    leaders, segment = torch.tensor([70, 3, 41]), torch.randint(3, (80,), generator=generator(6))
+    representatives, segment = torch.tensor([70, 3, 41]), torch.randint(3, (80,), generator=generator(6))
     lit_up(bits)
     alone = bits(*points)
-    for found, expected in zip(bits(*points, RaySegments(leaders, segment)), alone):
-        assert torch.equal(found, expected[leaders[segment]]) and not torch.equal(found, expected)
+    for found, expected in zip(bits(*points, RaySegments(representatives, segment)), alone):
+        assert torch.equal(found, expected[representatives[segment]]) and not torch.equal(found, expected)
 
 
 def test_lobes_are_summed_where_15_directions_are_within_them():

@@ -20,7 +20,6 @@ from splitnerf.plugins import TITLES, installed
 from splitnerf.progress import ended_by_signals
 
 COMMANDS = {"reconstruction": (train, refine), "results": (export, relight, evaluate), "this installation": (info,)}
-__all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "build_parser", "main"]
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -131,7 +131,7 @@ def observers_of(args: argparse.Namespace, run: Path) -> list[AbstractContextMan
     """The observers that the options request."""
     found = []
     if args.tensorboard:
-        from splitnerf.training.tensorboard import TensorBoard
+        from splitnerf.training.observer import TensorBoard
 
         found.append(TensorBoard(args.tensorboard))
     if args.view is not None:

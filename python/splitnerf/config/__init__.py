@@ -3,15 +3,3 @@
 from splitnerf.config.groups import MIN_EXPORT_SIZE
 from splitnerf.config.presets import PRESETS, parse_setting, preset
 from splitnerf.config.settings import FIELDS, GROUPS, SHORT_NAMES, Config, settings_table
-
-__all__ = [
-    "FIELDS",
-    "GROUPS",
-    "MIN_EXPORT_SIZE",
-    "PRESETS",
-    "SHORT_NAMES",
-    "Config",
-    "parse_setting",
-    "preset",
-    "settings_table",
-]

@@ -19,7 +19,7 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
 from splitnerf.data.photos import CERTAIN, Loader, Photo, silhouette_factor
-from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, new_array, room_for_photos
+from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, memory_for_photos, new_array
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, note_once
 from splitnerf.progress import tracked
@@ -150,12 +150,12 @@ class Dataset:
 
         Args:
             factor: At least 2, at most the smallest photo's shorter edge.
-            max_memory: GB for all photos, see :func:`splitnerf.data.pixels.room_for_photos`; what needs more goes to a file.
+            max_memory: GB for all photos, see :func:`splitnerf.data.pixels.memory_for_photos`; what needs more goes to a file.
             average: Takes a photo's codes [H, W, 4], the factor, and the known pixels [h, w] of the average (None: all); gives
                 the average [h, w, 4] uint16, with whole colours, see the attribute. By default averages are those of `downscale`.
         """
         shape = (len(self), self.height // factor, self.width // factor)
-        in_file = 2 * 4 * int(np.prod(shape)) > room_for_photos(max_memory)
+        in_file = 2 * 4 * int(np.prod(shape)) > memory_for_photos(max_memory)
         codes, known = new_array((*shape, 4), np.dtype(np.uint16), in_file), None
         if self.known is not None:
             known = np.stack([area_average(one.astype(np.float32), factor) > CERTAIN for one in self.known])
@@ -339,12 +339,9 @@ class _Contradiction(InputError):
 
 
 def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Photo], np.ndarray, str]:
-    """The photos of the train split, or of a part of it, the similarity to the internal frame, and what the masks are
-    whose layout leaves it open: "object" or "ignore".
-
-    Where the user does not say it, masks are the object's unless they keep nearly all of the photos or contradict the
-    poses; a note says what was assumed.
-    """
+    """The photos of the train split, or of a part of it, the similarity to the internal frame, and what masks of open
+    meaning are. Where the user does not say it, they are the object's unless they keep nearly all of the photos or
+    contradict the poses."""
     frames, kind = loader.frames, "ignore" if reading.mask_kind == "ignore" else "object"
     photos = loader.load(kind)
     masked = _has_masks(photos)

@@ -179,11 +179,9 @@ def undistort(planes: np.ndarray, distortion: Distortion, intrinsics: np.ndarray
 
 
 def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
-    """[h, w, C] values of a photo [1, C, H, W] between its pixels at places [h, w, 2] float64 (x, y), 0 at the first
-    pixel's centre, by Keys' cubic convolution with a = -1/2, which is exact for quadratic functions.
+    """[h, w, C] values of a photo [1, C, H, W] at places [h, w, 2] float64 (x, y), 0 at the first pixel's centre, by Keys' cubic convolution with a = -1/2, which is exact for quadratic functions.
 
-    The kernel is linear in a. torch has it for a = -3/4, which is not even exact for linear functions. For a = 0 it is
-    bilinear interpolation at the fraction t moved to 3 t^2 - 2 t^3. Two thirds and one third of these make a = -1/2.
+    It is linear in a: two thirds of torch's, with -3/4, and one third of a = 0, bilinear at the fraction 3 t^2 - 2 t^3.
     """
     size = torch.tensor([photo.shape[3], photo.shape[2]])
 

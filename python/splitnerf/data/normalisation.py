@@ -134,11 +134,8 @@ def spread_of(directions: np.ndarray) -> float:
 
 
 def nearest_to_rays(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """The point [3] with the least sum of squared distances to lines through origins [n, 3] along directions [n, 3], of
-    any length but 0.
-
-    It solves sum (I - d d^T) x = sum (I - d d^T) o; a trace of the identity keeps parallel lines solvable.
-    """
+    """The point [3] with the least sum of squared distances to lines through origins [n, 3] along directions [n, 3]:
+    sum (I - d d^T) x = sum (I - d d^T) o; a trace of the identity keeps parallel lines solvable."""
     d = directions / np.linalg.norm(directions, axis=1, keepdims=True)  # rounded ones outweigh the trace
     projections = np.eye(3) - d[:, :, None] * d[:, None, :]
     right = np.einsum("nij,nj->i", projections, origins)
@@ -191,12 +188,8 @@ class MaskView:
 
 
 def _inside(points: np.ndarray, cell: float, views: list[MaskView]) -> tuple[np.ndarray, int]:
-    """Indices of the points that at most one view in twenty puts on background, and how many views put the best of them
-    on foreground.
-
-    Points that few views see, far in front of or behind the object, are dropped: what stays is seen by at least three
-    quarters as many views as the best seen point.
-    """
+    """Indices of the points that at most one view in twenty puts on background, without those that few views see, far
+    from the object; and how many views put the best of them on foreground."""
     alive = np.arange(len(points))
     misses, seen = np.zeros(len(points), dtype=np.int32), np.zeros(len(points), dtype=np.int32)
     for view in views:

@@ -37,8 +37,8 @@ from splitnerf.data.pixels import (
     encoded,
     folder_of_files,
     forget_pages,
+    memory_for_photos,
     new_array,
-    room_for_photos,
 )
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, note_once
@@ -193,12 +193,9 @@ def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> 
 
 
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
-    """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied.
-
-    Floats are linear radiance; the factor then brings nearly all below PEAK, and what is above 1 is clipped. Whole
-    numbers are sRGB or, where `gamma` is not 0, linear values to the power of 1 / gamma. Raises InputError where floats
-    are negative, infinite or NaN.
-    """
+    """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied: floats
+    are linear radiance, nearly all of which it brings below PEAK; whole numbers are sRGB or, with a gamma, linear
+    values to the power 1 / gamma."""
     pixels = read_colours(path)
     n_colours = 3 if pixels.shape[2] >= 3 else 1
     if pixels.dtype.kind != "f":
@@ -218,9 +215,8 @@ def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
 
 
 def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
-    """The values with negative ones set to 0: noise of raw photos, or what a filter leaves beside a lamp. Together they
-    are at most a thousandth of the sum, and none is further below 0 than a tenth of the brightest value is above; else,
-    and for NaN or infinite ones, it raises InputError."""
+    """The values with negative ones set to 0, which are noise of raw photos or what a filter leaves beside a lamp.
+    Raises InputError where they are more than that, or not finite."""
     dark, total = -pixels.sum(where=pixels < 0, dtype=np.float64), pixels.sum(where=pixels > 0, dtype=np.float64)
     deepest = -RINGING * pixels.max()
     if not (np.isfinite(pixels).all() and dark <= NEGATIVE_SHARE * total and pixels.min() >= deepest):
@@ -231,9 +227,8 @@ def _without_noise(pixels: np.ndarray, path: Path) -> np.ndarray:
 def _undistort(
     rgba: np.ndarray, known: np.ndarray | None, frame: Frame, *, straight: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The image [H, W, 4] as a pinhole sees it, without meaning where it is not known, and the known pixels [H, W, 1]
-    (None: all). `straight`: whether the colours are the photo's also where alpha is 0; else only colour times alpha is
-    one."""
+    """The image [H, W, 4] as a pinhole sees it, and its known pixels [H, W, 1] (None: all). `straight`: whether colours
+    count where alpha is 0."""
     size = rgba.shape[:2]
     if not straight:
         rgba = np.concatenate([rgba[..., :3] * rgba[..., 3:], rgba[..., 3:]], axis=-1)
@@ -326,10 +321,10 @@ class Loader:
         floats = bent or any(f.gamma != 0 or f.image_path.suffix.lower() in HDR_SUFFIXES for f in frames)
         work = height * width * (WORK_BENT if floats else WORK)
         size = keep * int(np.prod(shape)) * (4 * kind.itemsize + hides)
-        room = room_for_photos(reading.max_memory)
-        in_file = size + work > room
-        whole = max(room, int(reading.max_memory * GB))  # with what the photos of another split take
-        room -= 0 if in_file else size
+        available = memory_for_photos(reading.max_memory)
+        in_file = size + work > available
+        whole = max(available, int(reading.max_memory * GB))  # with what the photos of another split take
+        available -= 0 if in_file else size
         if work > whole:
             raise InputError(
                 f"{root}: one photo of {width}x{height} takes {work / GB:.2g} GB while it is read, more than the "
@@ -337,10 +332,10 @@ class Loader:
             )
         if in_file and keep:
             note_once(
-                f"{root}: {len(frames)} photos take {size / GB:.2g} GB, more than the {max(room, 0) / GB:.2g} GB of memory left "
+                f"{root}: {len(frames)} photos take {size / GB:.2g} GB, more than the {max(available, 0) / GB:.2g} GB of memory left "
                 f"for photos (--max-memory): they are read from a file in {folder_of_files()}"
             )
-        self.threads = max(1, min(THREADS, os.cpu_count() or 1, room // work))
+        self.threads = max(1, min(THREADS, os.cpu_count() or 1, available // work))
         self.codes = new_array((*shape, 4), kind, in_file) if keep else None
         self._known = new_array(shape, np.dtype(bool), in_file) if keep and hides else None
         self.known: np.ndarray | None = None

@@ -112,7 +112,7 @@ def at_unit_exposure(values: Tensor, exposures: Tensor) -> Tensor:
     return torch.where(exposures == 1, values, ops.linear_to_srgb(ops.srgb_to_linear(values) / exposures))
 
 
-def room_for_photos(max_memory: float) -> int:
+def memory_for_photos(max_memory: float) -> int:
     """Bytes that photos may still take: of `max_memory` GB, or where that is 0 of half of the memory available."""
     if max_memory > 0:
         return int(max_memory * GB) - sum(array.nbytes for array in _in_memory.values())

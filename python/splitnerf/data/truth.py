@@ -101,11 +101,8 @@ def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
 
 
 def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals [..., 3] float32 whose negative components were clipped to 0 before they were sRGB-encoded, 0 where
-    unknown, and the known pixels [...] bool.
-
-    A single component of 0 is restored as -sqrt(1 - sum of the others' squares); with more zeros the normal is unknown.
-    """
+    """Unit normals [..., 3] whose negative components were clipped to 0 before they were sRGB-encoded, 0 where unknown,
+    and the known pixels [...] bool: a single component of 0 is restored, with more zeros the normal is unknown."""
     components = srgb_to_linear(encoded)
     clipped = components <= 0
     known = clipped.sum(axis=-1) <= 1

@@ -152,14 +152,11 @@ def _novel_view(
 ) -> dict | None:
     if not all("rgb" in prediction for prediction in predictions):
         return None
-    return mean_scores(
-        [
-            image_scores(
-                over_background(p["rgb"], p["alpha"]), over_background(image[..., :3], image[..., 3]), distance, k
-            )
-            for p, image, k in zip(predictions, images, known)
-        ]
-    )
+    scores = []
+    for p, photo, k in zip(predictions, images, known):
+        shown, truth = over_background(p["rgb"], p["alpha"]), over_background(photo[..., :3], photo[..., 3])
+        scores.append(image_scores(shown, truth, distance, k))
+    return mean_scores(scores)
 
 
 def _albedo(
@@ -179,15 +176,11 @@ def _albedo(
 
 def _scales(views: Iterable[ScaledView]) -> dict[str, np.ndarray]:
     sums, samples = np.zeros((2, 3)), []
-    for x, y in _foregrounds(views):
+    for view in views:
+        mask = (view.alpha > OPAQUE) & (view.truth_alpha > OPAQUE)
+        x, y = view.prediction[mask], view.truth[mask]
         sums += metrics.lsq_sums(x, y)
         step = max(1, len(x) // MEDIAN_PIXELS)
         samples.append((x[::step], y[::step]))
     x, y = (np.concatenate(parts) for parts in zip(*samples))
     return {"raw": np.ones(3), "lsq": metrics.scale_of_sums(sums), "median": metrics.median_scale(x, y)}
-
-
-def _foregrounds(views: Iterable[ScaledView]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    for view in views:
-        mask = (view.alpha > OPAQUE) & (view.truth_alpha > OPAQUE)
-        yield view.prediction[mask], view.truth[mask]

@@ -7,6 +7,7 @@ from itertools import product
 
 import fast_simplification
 import numpy as np
+import trimesh
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
@@ -58,10 +59,7 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[n
 
 def is_closed(faces: np.ndarray) -> bool:
     """Whether each directed edge occurs exactly once, and its reverse exactly once."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    span = int(faces.max()) + 1
-    there, back = (np.unique(edges[:, a] * span + edges[:, b]) for a, b in ((0, 1), (1, 0)))
-    return len(there) == len(edges) and np.array_equal(there, back)
+    return all(trimesh.graph.is_watertight(trimesh.geometry.faces_to_edges(faces)))
 
 
 def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.ndarray, np.ndarray]:

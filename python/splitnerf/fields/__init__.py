@@ -3,17 +3,3 @@
 from splitnerf.fields.light import EvaluatedLight, Light, LightMlp, LightPyramid
 from splitnerf.fields.occlusion import Occlusion, RaySegments, SkyCells, VisibilityBits
 from splitnerf.fields.surface import MaterialHead, OcclusionHead, SdfField
-
-__all__ = [
-    "EvaluatedLight",
-    "Light",
-    "LightMlp",
-    "LightPyramid",
-    "MaterialHead",
-    "Occlusion",
-    "OcclusionHead",
-    "RaySegments",
-    "SdfField",
-    "SkyCells",
-    "VisibilityBits",
-]

@@ -385,10 +385,8 @@ def pyramid_filters(resolution: int) -> PyramidFilters:
 
 @functools.lru_cache(maxsize=4)
 def octahedral_texels(resolution: int, device: torch.device) -> tuple[Tensor, Tensor]:
-    """The mean directions [n^2, 3] and the solid angles [n^2] of an octahedral map's texels, in the order of its rows.
-
-    A texel's solid angle is that of its parts, du dv / |p|^3 each, where p is the point of the octahedron.
-    """
+    """The mean directions [n^2, 3] and the solid angles [n^2] of an octahedral map's texels, row by row, from parts of
+    du dv / |p|^3."""
     with torch.inference_mode(False):
         n = TEXEL_PARTS * resolution
         axis = (torch.arange(n, dtype=torch.float64) + 0.5) * (2.0 / n) - 1.0

@@ -120,7 +120,7 @@ class SparseMap(NamedTuple):
     transposed_weights: Tensor
 
 
-def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> SparseMap:
+def sparse_map(parts: list[tuple]) -> SparseMap:
     """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns)."""
     n_columns = parts[0][3]
     starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
@@ -133,10 +133,10 @@ def sparse_map(parts: list[tuple], dtype: torch.dtype = torch.float32) -> Sparse
     return SparseMap(
         torch.from_numpy(offsets.astype(np.int64)),
         torch.from_numpy(columns),
-        torch.from_numpy(weights).to(dtype),
+        torch.from_numpy(weights).float(),
         torch.from_numpy(transposed_offsets.astype(np.int64)),
         torch.from_numpy(rows[order]),
-        torch.from_numpy(weights[order]).to(dtype),
+        torch.from_numpy(weights[order]).float(),
     )
 
 

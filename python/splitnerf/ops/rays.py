@@ -243,8 +243,8 @@ class ShadingSubset(NamedTuple):
         share: [n] weight of the second neighbour in [0, 1], linear in the distance along the ray.
         heaviest: [rays with samples] int64 positions in ``shaded``: the shaded sample of the largest weight on each
             ray.
-        leaders: [segments] int64 positions in ``shaded``: the shaded sample of the largest weight on each segment.
-        stretch: [m] int64, the segment of each shaded sample.
+        representatives: [segments] int64 positions in ``shaded``: the shaded sample of the largest weight on each segment.
+        segment: [m] int64, the segment of each shaded sample.
         sizes: [3] int64, the numbers of shaded samples, of rays with samples and of segments.
     """
 
@@ -253,8 +253,8 @@ class ShadingSubset(NamedTuple):
     second: Tensor
     share: Tensor
     heaviest: Tensor
-    leaders: Tensor
-    stretch: Tensor
+    representatives: Tensor
+    segment: Tensor
     sizes: Tensor
 
     def interpolate(self, values: Tensor) -> Tensor:
@@ -285,7 +285,7 @@ def spread_samples(
 
     Args:
         weights: [n] rendering weights.
-        samples: The packed samples; how far they are apart is told by their starts.
+        samples: The packed samples; their starts say how far apart they are.
         per_ray: The number of marks on a ray; 0 draws all samples.
         phase: [n_rays] position of each ray's first mark in [0, 1), as a share of the marks' spacing.
         gap: The distance along the ray at which segments are split, positive, in units of `unit`.
@@ -334,10 +334,10 @@ def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_st
     sizes = (max_shaded, phase.shape[0], max_stretches)
     if max_shaded < 0:
         sizes = (torch.library.get_ctx().new_dynamic_size() for _ in range(3))
-    shaded, heaviest, leaders = (weights.new_empty(size, dtype=torch.int64) for size in sizes)
+    shaded, heaviest, representatives = (weights.new_empty(size, dtype=torch.int64) for size in sizes)
     first, second = (weights.new_empty(weights.shape, dtype=torch.int64) for _ in range(2))
-    share, stretch = weights.new_empty(weights.shape), shaded.new_empty(shaded.shape)
-    return shaded, first, second, share, heaviest, leaders, stretch, shaded.new_empty(3)
+    share, segment = weights.new_empty(weights.shape), shaded.new_empty(shaded.shape)
+    return shaded, first, second, share, heaviest, representatives, segment, shaded.new_empty(3)
 
 
 def _keep_interpolation(ctx, inputs, output):

@@ -203,10 +203,8 @@ def _keep_encoded(ctx, inputs, output):
 
 
 def refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor], place: int = 7) -> None:
-    """Raises where a 16-bit tensor requires a gradient: autograd would round it, and small gradients would vanish.
-
-    The table is the operator's argument number 1, its copy number `place`.
-    """
+    """Raises where a 16-bit table, or its copy, argument number `place`, needs a gradient: small ones would round to
+    0."""
     if stored:
         refuse_gradients(ctx, op, stored=place)
     if ctx.needs_input_grad[1] and table.dtype in (torch.float16, torch.bfloat16):

@@ -76,11 +76,9 @@ def sharpness(variance: Tensor) -> Tensor:
 def wide_lobes(
     candidates: Tensor, roughness: Tensor, low: float, high: float, n_candidates: Tensor | None
 ) -> tuple[Tensor, Tensor]:
-    """The points whose lobes are wide enough for a sum over directions, and the share [m] by which it counts.
-
-    ``share = t^2 (3 - 2 t)``, t rising from 0 at the roughness `low` to 1 at `high`. With `n_candidates`, the number of
-    leading candidates that count, all stay and the others have a share of 0; else those with a share of 0 are left out.
-    """
+    """The points whose lobes are wide enough for a sum over directions, and the share [m], t^2 (3 - 2 t), by which it
+    counts; t rises from 0 at roughness `low` to 1 at `high`. With `n_candidates`, the number of leading candidates that
+    count, all stay and the others have a share of 0; else those with a share of 0 are left out."""
     t = ((roughness[:, 0].index_select(0, candidates) - low) / (high - low)).clamp(0, 1)
     share = t * t * (3 - 2 * t)
     if n_candidates is not None:
@@ -94,13 +92,15 @@ def make_light(config: Config) -> Light:
     """The light that the setting ``light.kind`` names."""
     if config.light.kind == "pyramid":
         return LightPyramid(config.light.resolution)
-    return LightMlp(
-        config.constants.light_width,
-        config.constants.light_layers,
-        config.constants.direction_frequencies,
-        config.constants.roughness_frequencies,
-        config.constants.light_activation,
-    )
+    c = config.constants
+    frequencies = c.direction_frequencies, c.roughness_frequencies
+    return LightMlp(c.light_width, c.light_layers, *frequencies, c.light_activation)
+
+
+def grid_spec(config: Config) -> HashGridSpec:
+    """The shape of the surface's hash grid."""
+    c, coarsest = config.surface, config.constants.base_resolution
+    return HashGridSpec(c.n_levels, N_FEATURES, coarsest, c.growth, c.log2_table_size)
 
 
 class SceneModel(nn.Module):
@@ -120,27 +120,13 @@ class SceneModel(nn.Module):
 
     def __init__(self, config: Config):
         super().__init__()
-        self.config = config
-        spec = HashGridSpec(
-            config.surface.n_levels,
-            N_FEATURES,
-            config.constants.base_resolution,
-            config.surface.growth,
-            config.surface.log2_table_size,
-        )
-        dtype = None if config.surface.table_dtype == "float32" else getattr(torch, config.surface.table_dtype)
-        self.sdf_field = SdfField(
-            spec, config.constants.box, config.constants.surface_width, N_OUTPUTS, config.constants.sphere_radius, dtype
-        )
-        n_inputs = N_OUTPUTS + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
-        self.material = MaterialHead(
-            n_inputs,
-            config.constants.materials_width,
-            HEAD_LAYERS,
-            config.constants.initial_roughness,
-            config.constants.min_roughness,
-        )
+        self.config, spec = config, grid_spec(config)
         c, kind = config.constants, config.occlusion.kind
+        dtype = None if config.surface.table_dtype == "float32" else getattr(torch, config.surface.table_dtype)
+        self.sdf_field = SdfField(spec, c.box, c.surface_width, N_OUTPUTS, c.sphere_radius, dtype)
+        n_inputs = N_OUTPUTS + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
+        roughness = c.initial_roughness, c.min_roughness
+        self.material = MaterialHead(n_inputs, c.materials_width, HEAD_LAYERS, *roughness)
         head = n_inputs, c.occlusion_width, HEAD_LAYERS, config.occlusion.channels, config.occlusion.directional
         self.occlusion = OcclusionHead(*head) if kind == "mlp" else None
         self.cells = SkyCells(c.occlusion_directions) if kind == "bits" else None
@@ -148,7 +134,7 @@ class SceneModel(nn.Module):
         self.has_mesh = False
         self.turns: Tensor | None = None
         self.light = make_light(config)
-        self.variance = nn.Parameter(torch.tensor(config.constants.initial_variance))
+        self.variance = nn.Parameter(torch.tensor(c.initial_variance))
 
     @property
     def device(self) -> torch.device:
@@ -170,11 +156,9 @@ class SceneModel(nn.Module):
 
     def open_levels(self, progress: float) -> None:
         """Opens the hash-grid levels of this progress: one after the other until ``levels_open_by`` of the run."""
-        c = self.config
-        share = min(1.0, progress / c.constants.levels_open_by) if c.constants.levels_open_by > 0 else 1.0
-        self.sdf_field.grid.n_active = min(
-            c.surface.n_levels, c.constants.start_levels + int(share * (c.surface.n_levels - c.constants.start_levels))
-        )
+        c, n_levels = self.config.constants, self.config.surface.n_levels
+        share = min(1.0, progress / c.levels_open_by) if c.levels_open_by > 0 else 1.0
+        self.sdf_field.grid.n_active = min(n_levels, c.start_levels + int(share * (n_levels - c.start_levels)))
 
     def surface(self, positions: Tensor) -> SdfSample:
         """The SDF's outputs, hash features and gradient at positions [n, 3], scene units."""
@@ -245,8 +229,8 @@ class SceneModel(nn.Module):
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
         albedo, roughness, metallic = self.material(*inputs)
-        asked = light_queries(normals, view_dirs, roughness, c.shading.query)
-        lobe_dirs, facing = asked[0].chunk(2)
+        queries = light_queries(normals, view_dirs, roughness, c.shading.query)
+        lobe_dirs, facing = queries[0].chunk(2)
         surface = on_surface(positions, normals, outputs[:, 0])
         occlusion = self.occlusion_at(inputs, surface, facing, lobe_dirs, roughness, segments)
         shaded = split_sum_shade(
@@ -255,7 +239,7 @@ class SceneModel(nn.Module):
             albedo,
             roughness,
             metallic,
-            light(*asked),
+            light(*queries),
             None,
             occlusion.specular,
             occlusion.diffuse,

@@ -10,17 +10,15 @@ from splitnerf.devices import tensor_cores
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-    """World rays through image points.
+    """World rays through image points: origins and unit directions, [n, 3] each.
 
     Args:
         pose: [n, 4, 4] or [4, 4] camera-to-world, OpenGL axes (x right, y up, looking along -z).
         intrinsics: [n, 4] or [4], fx, fy, cx, cy in pixels.
         x, y: [n] pixels; the centre of pixel (column, row) is (column + 0.5, row + 0.5).
-
-    Returns:
-        origins and unit directions, [n, 3] each, in the world's units.
     """
-    directions = through_pixels(pixel_matrix(pose, intrinsics), x, y)
+    points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
+    directions = F.normalize((pixel_matrix(pose, intrinsics) * points[..., None, :]).sum(-1), dim=-1)
     return pose[..., :3, 3].expand_as(directions).contiguous(), directions
 
 
@@ -35,13 +33,6 @@ def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
     rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]
     with tensor_cores(False):
         return pose[..., :3, :3] @ torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
-
-
-def through_pixels(matrix: Tensor, x: Tensor, y: Tensor) -> Tensor:
-    """[n, 3] unit directions through image points x, y [n]; the matrices [n, 3, 3] or [3, 3] are
-    :func:`pixel_matrix`'s."""
-    points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
-    return F.normalize((matrix * points[..., None, :]).sum(-1), dim=-1)
 
 
 def projected(points: Tensor, intrinsics: Tensor) -> Tensor:

@@ -132,10 +132,8 @@ class RenderedRays:
 
 def sample_step(config: Config, s: float) -> float:
     """Length of a sample in scene units: proportional to the width 1/s of the density, within the configured bounds."""
-    return min(
-        max(config.constants.step_scale / s, config.constants.min_step),
-        max(config.constants.max_step, config.constants.min_step),
-    )
+    c = config.constants
+    return min(max(c.step_scale / s, c.min_step), max(c.max_step, c.min_step))
 
 
 @torch.no_grad()
@@ -232,8 +230,8 @@ def add_corrections(
     """The rays' colours [n_rays, 3] with corrections [m, 3] of their shaded samples `at` [m], each by the share of the ray's
     opacity that the sample's segment carries; `shares` [n_shaded] is the weight that each shaded sample stands for."""
     rays = ray_indices.index_select(0, spread.shaded.index_select(0, at))
-    carried = shares.new_zeros(len(spread.leaders)).index_add(0, spread.stretch, shares)
-    part = carried.index_select(0, spread.stretch.index_select(0, at)) / opacity.index_select(0, rays).clamp(
+    carried = shares.new_zeros(len(spread.representatives)).index_add(0, spread.segment, shares)
+    part = carried.index_select(0, spread.segment.index_select(0, at)) / opacity.index_select(0, rays).clamp(
         min=MIN_OPACITY
     )
     return mean.index_add(0, rays, correction * part[:, None])
@@ -283,7 +281,7 @@ def render_rays(
     positions, directions, normals, outputs, features = (x.index_select(0, shaded) for x in of_samples)
     view_dirs = -directions
     sdf = outputs[:, 0]
-    segments = RaySegments(spread.leaders, spread.stretch)
+    segments = RaySegments(spread.representatives, spread.segment)
     turned = light if turns is None else light.turned(turns[samples.ray_indices.index_select(0, shaded)])
     points = model.shade(turned, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)

@@ -45,11 +45,8 @@ def training_photos(dataset: Dataset, config: Config) -> Dataset:
 
 
 def averaging_factor(dataset: Dataset, config: Config) -> int:
-    """The integer factor by which photos are averaged down for training; 1: none.
-
-    The width of a pixel is that at the middle of the scene's box, or where the box ends for cameras within it, as a
-    median over the photos.
-    """
+    """The integer factor by which photos are averaged down, 1 for none: by the median width of a pixel at the middle of
+    the scene's box, or where the box ends for cameras within it."""
     box, most = config.constants.box, max(1, int(dataset.sizes.min()) // LEAST_EDGE)
     pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)
     cell = 2 * box / config.finest_cells
@@ -60,45 +57,28 @@ PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
 BRIGHTEST = 250  # of 255: a brighter background may be clipped, so that the mask decides where the edge is
 
 
-class EdgePixels:
-    """The pixels within a band along the edges of the masks, where a mask is not trusted to a pixel.
+def edge_runs(
+    photos: list[tuple[tuple[np.ndarray, np.ndarray], np.ndarray]], n_pixels: int, device: torch.device
+) -> EdgeRuns:
+    """The pixels within a band along the edges of the masks, of the results of :func:`edge_of` for photos with as many pixels.
 
-    There a pixel's colour is compared including the background: the object over the colour behind it, which is filled
-    in from outside the band. 24 bytes a run of neighbours and 3 a pixel.
-
-    Args:
-        photos: The result of :func:`edge_of` for each photo.
-        n_pixels: The number of pixels of a photo.
-        device: The device of lookups.
-
-    Attributes:
-        runs: The pixels and the colours behind the object there, at the photos' own exposures.
+    There a mask is not trusted to a pixel: a colour is compared including the background, the object over the colour behind
+    it, which is filled in from outside the band. 24 bytes a run of neighbours and 3 a pixel.
     """
-
-    def __init__(
-        self, photos: list[tuple[tuple[np.ndarray, np.ndarray], np.ndarray]], n_pixels: int, device: torch.device
-    ):
-        starts, ends = joined([runs for runs, _ in photos], n_pixels)
-        before = np.cumsum(ends - starts) - (ends - starts)
-        behind = np.concatenate([behind for _, behind in photos])
-        self.runs = EdgeRuns(*(torch.from_numpy(x).to(device) for x in (starts, ends, before - starts, behind)))
-
-    def __len__(self) -> int:
-        return len(self.runs.behind)
+    if not photos:
+        return EdgeRuns.none(device)
+    starts, ends = joined([runs for runs, _ in photos], n_pixels)
+    before = np.cumsum(ends - starts) - (ends - starts)
+    behind = np.concatenate([behind for _, behind in photos])
+    return EdgeRuns(*(torch.from_numpy(x).to(device) for x in (starts, ends, before - starts, behind)))
 
 
 def edge_of(
     colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The pixels of a photo within a band along its mask's edges as runs (see :func:`runs_of`),
-    and the sRGB colours [k, 3] uint8 behind the object there. Pixels in front of a clipped background are left out.
-
-    Args:
-        colours: [H, W, 3] sRGB, whole numbers or floats in [0, 1].
-        alpha: [H, W] the mask, in [0, 1].
-        known: [H, W] bool, the valid pixels; None for all.
-        width: The pixels on each side of an edge.
-    """
+    """The pixels of a photo within `width` pixels of its mask's edges as runs (see :func:`runs_of`), and the sRGB
+    colours [k, 3] uint8 behind the object there. Pixels before a clipped background are left out. `colours` [H, W, 3]
+    are whole numbers or floats in [0, 1], `alpha` [H, W] is the mask, `known` [H, W] the valid pixels (None: all)."""
     near, behind = edge_mask(colours, alpha, known, width)
     return runs_of(torch.from_numpy(near)), behind
 
@@ -120,20 +100,9 @@ def edge_mask(
 
 
 def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
-    """Averages a photo down as :class:`EdgePixels` compares it.
-
-    Along the mask's edges and outside of the mask, a pixel is the mean of object and background. The other pixels that
-    the object covers in part are means of the object alone: there the mask decides where the edge is.
-
-    Args:
-        photo: [H, W, 4] sRGB of a whole photo, and its mask.
-        factor: The edge of a block in pixels, at least 2.
-        known: [H // factor, W // factor] bool, the valid averages; None for all.
-        width: The pixels of the average on each side of an edge.
-
-    Returns:
-        [H // factor, W // factor, 4] uint16.
-    """
+    """Averages a photo [H, W, 4] down as :func:`edge_runs` has it compared: along the mask's edges and outside of it, a
+    pixel is the mean of object and background; elsewhere it is that of the object alone. `known` [h, w] are the valid
+    averages, `width` the pixels of the average on each side of an edge. Gives [h, w, 4] uint16."""
     result, whole = (averaged_codes(photo, factor, object_alone=alone) for alone in (True, False))
     whole, alpha = whole[..., :3], decoded(result[..., 3])
     shown = edge_mask(whole, alpha, known, width)[0] | (alpha <= PARTLY[0])
@@ -150,14 +119,8 @@ def band(alpha: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def filled_in(colours: np.ndarray, near: np.ndarray, outside: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels [k] of a band that have some outside within reach, and their mean colour [k, 3], weighted by a
-    Gaussian, over every third pixel in both directions.
-
-    Args:
-        colours: [H, W, 3].
-        near, outside: [H, W] bool.
-        size: Half the width of the band in pixels, which is the Gaussian's deviation.
-    """
+    """The pixels [k] of a band `near` [H, W] that have some `outside` within reach, and their mean colour [k, 3],
+    weighted by a Gaussian of deviation `size`, half the band's width, over every third pixel in both directions."""
     height, width = near.shape
     reach = 3 * (size + 1)
     step = np.arange(-reach, reach + 1, 3)
@@ -235,27 +198,6 @@ class PixelReader:
         return read_pixels(self.codes, index, view, exposures, backgrounds, edges)
 
 
-class DrawnRays(NamedTuple):
-    """Rays through pixels of photos.
-
-    Attributes:
-        rays_o, rays_d: [n, 3] origins and unit directions.
-        pixels: [n, 4] sRGB of the photos as they are, in [0, 1], straight alpha.
-        view: [n] int64, the photos' numbers.
-        exposure: [n, 3] the factors of the photos' linear values.
-        background: [n, 3] sRGB colours behind the pixels; at edges the photo's background, filled in.
-        whole: [n] bool, the pixels along the masks' edges.
-    """
-
-    rays_o: Tensor
-    rays_d: Tensor
-    pixels: Tensor
-    view: Tensor
-    exposure: Tensor
-    background: Tensor
-    whole: Tensor
-
-
 class PixelSource:
     """Draws training rays: most of them near the objects' masks, the rest anywhere.
 
@@ -266,7 +208,7 @@ class PixelSource:
         edge_pixels: The width on each side of the masks' edges in pixels of `edges`; 0: none.
 
     Attributes:
-        edges: The pixels along the masks' edges; None where there are none, or the photos have no colours outside.
+        edges: The pixels along the masks' edges; none where the photos have no colours outside.
         turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`, or None.
         foreground, known: The valid pixels near a mask, and all valid pixels.
         possible: [n, h, w] bool, where the photos may show the object: within the masks, and at invalid pixels. Those
@@ -304,9 +246,7 @@ class PixelSource:
         self.foreground = pixel_list(near, n_pixels, self.device)
         n_all = n_pixels * len(dataset)
         self.known = pixel_list(known, n_pixels, self.device) if known else PixelList.all(n_all, self.device)
-        has_edges = any(len(behind) for _, behind in edges)
-        self.edges = EdgePixels(edges, n_pixels, self.device) if has_edges else None
-        self._no_edges = EdgeRuns.none(self.device)
+        self.edges = edge_runs(edges, n_pixels, self.device)
 
     def hull(self, config: Config) -> Tensor:
         """[r, r, r] bool, the cells of the occupancy grid within the masks' visual hull."""
@@ -315,8 +255,8 @@ class PixelSource:
 
     def draw(
         self, n: int, random: Tensor | None = None, backgrounds: Tensor | None = None, exposures: Tensor | None = None
-    ) -> DrawnRays:
-        """Draws n rays; see :func:`splitnerf.ops.draw_rays`.
+    ) -> tuple[Tensor, ...]:
+        """Draws n rays, see :func:`splitnerf.ops.draw_rays`: the first seven of :class:`Batch`, the photos as they are.
 
         Args:
             n: The number of rays.
@@ -332,9 +272,8 @@ class PixelSource:
         rays_o, rays_d, view, index = draw_rays(
             random, n_near, self.foreground, self.known, self.matrices, self.origins, self.height, self.width
         )
-        edges = self._no_edges if self.edges is None else self.edges.runs
-        pixels, *beside = self.pixels.read(index, view, exposures, backgrounds, edges)
-        return DrawnRays(rays_o, rays_d, pixels, view, *beside)
+        pixels, *beside = self.pixels.read(index, view, exposures, backgrounds, self.edges)
+        return rays_o, rays_d, pixels, view, *beside
 
 
 class Batch(NamedTuple):
@@ -343,25 +282,25 @@ class Batch(NamedTuple):
     Attributes:
         rays_o, rays_d: [n, 3] origins (scene units) and unit directions.
         target: [n, 4] sRGB values of the photos as they are, straight alpha; at an exposure of 1 where samples are added as sRGB.
+        view: [n] int64, the photos' numbers.
+        exposure: [n, 3] the factors of the photos' linear values.
         background: [n, 3] random sRGB colours in [0, 1), behind the photo and the rendering alike; of whole pixels what the
             photo would show without the object.
         whole: [n] bool, the pixels along the masks' edges, whose colours are compared whole.
         jitter: [n] offsets of each ray's samples in [0, 1), as shares of a sample's length.
         phase: [n] in [0, 1), where the choice of each ray's shaded samples begins.
-        view: [n] int64, the photos' numbers.
-        exposure: [n, 3] the factors of the photos' linear values.
         probes: Other points that the losses evaluate.
     """
 
     rays_o: Tensor
     rays_d: Tensor
     target: Tensor
+    view: Tensor
+    exposure: Tensor
     background: Tensor
     whole: Tensor
     jitter: Tensor
     phase: Tensor
-    view: Tensor
-    exposure: Tensor
     probes: ProbePoints
 
     @property
@@ -379,29 +318,21 @@ def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tens
         source.generator, [n_rays, n_rays, n_rays, 3 * n_rays, *probe_counts(config)]
     )
     drawn = source.draw(n_rays, pixels, backgrounds.view(n_rays, 3), exposures)
-    target, background, exposure = drawn.pixels, drawn.background, drawn.exposure
-    if config.shading.compositing == "srgb":
-        target = torch.cat([at_unit_exposure(target[:, :3], exposure), target[:, 3:]], dim=1)
-        background = torch.where(drawn.whole[:, None], at_unit_exposure(background, exposure), background)
-        exposure = torch.ones_like(exposure)
-    return Batch(
-        drawn.rays_o,
-        drawn.rays_d,
-        target,
-        background,
-        drawn.whole,
-        jitter,
-        phase,
-        drawn.view,
-        exposure,
-        make_probes(config, chosen, probes),
+    batch = Batch(*drawn, jitter, phase, make_probes(config, chosen, probes))
+    if config.shading.compositing == "linear":
+        return batch
+    target, background, exposure = batch.target, batch.background, batch.exposure
+    return batch._replace(
+        target=torch.cat([at_unit_exposure(target[:, :3], exposure), target[:, 3:]], dim=1),
+        background=torch.where(batch.whole[:, None], at_unit_exposure(background, exposure), background),
+        exposure=torch.ones_like(exposure),
     )
 
 
 def draw_numbers(generator: torch.Generator, counts: list[int]) -> list[Tensor]:
     """Vectors of so many numbers in [0, 1), drawn together. Each begins at a multiple of 16 bytes, so that no operator copies it."""
-    rooms = [-(-n // 4) * 4 for n in counts]
-    parts = torch.rand(sum(rooms), generator=generator, device=generator.device).split(rooms)
+    lengths = [-(-n // 4) * 4 for n in counts]
+    parts = torch.rand(sum(lengths), generator=generator, device=generator.device).split(lengths)
     return [part[:n] for part, n in zip(parts, counts)]
 
 
@@ -412,11 +343,8 @@ def probe_counts(config: Config) -> tuple[int, int]:
 
 
 def make_probes(config: Config, chosen: Tensor, random: Tensor) -> ProbePoints:
-    """Points for the eikonal loss and for the smoothness loss, in addition to the samples of the rays.
-
-    Args:
-        chosen, random: Numbers in [0, 1), as many as :func:`probe_counts` says.
-    """
+    """Points for the eikonal and the smoothness loss beside the rays' samples; as many numbers as :func:`probe_counts`
+    says."""
     c = config
     first, u = random.split([3 * c.constants.eikonal_points, 4 * len(chosen)])
     radius, angle = torch.sqrt(-2 * torch.log1p(-u[::2])), 2 * math.pi * u[1::2]  # Box and Muller 1958

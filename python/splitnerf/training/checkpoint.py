@@ -12,9 +12,8 @@ from torch import Tensor, nn
 from splitnerf.config import Config
 from splitnerf.data.tensor_files import check_tensor, read_tensors, write_tensors
 from splitnerf.errors import InputError
-from splitnerf.ops.sdf import HashGridSpec
 from splitnerf.refinement.refine import STATE
-from splitnerf.render.model import N_FEATURES
+from splitnerf.render.model import grid_spec
 from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.seen import Cameras
 from splitnerf.training.start import HELD_UNTIL, StartShape
@@ -81,11 +80,7 @@ def restore(training: Any) -> None:
 
 
 def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict) -> None:
-    """Writes a new file and then renames it over the old checkpoint, so that a complete checkpoint always exists.
-
-    Raises:
-        OSError: The disk is full or the folder cannot be written; the old checkpoint is kept.
-    """
+    """Writes a new file, then renames it over the old checkpoint, which an error leaves as it is. Raises OSError."""
     write_tensors(path, {"format": FORMAT, "config": dataclasses.asdict(config), "fingerprint": fingerprint, **state})
 
 
@@ -128,11 +123,8 @@ def config_of(content: dict) -> Config:
 
 
 def restore_model(model: nn.Module, content: dict, path: Path) -> None:
-    """Puts the parameters of a checkpoint into a model.
-
-    Raises:
-        InputError: The model has other parameters: the settings differ from those of the checkpoint.
-    """
+    """Puts a checkpoint's parameters into a model. Raises InputError where the settings differ from the
+    checkpoint's."""
     ours, stored = model.state_dict(), content["model"]
     for name in [*ours, *stored]:
         if name not in ours or name not in stored or ours[name].shape != stored[name].shape:
@@ -141,11 +133,8 @@ def restore_model(model: nn.Module, content: dict, path: Path) -> None:
 
 
 def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Path) -> None:
-    """Puts the moments of a checkpoint into an AdamW; rates and decay stay those of the settings.
-
-    Raises:
-        InputError: The moments do not fit the optimiser's parameters.
-    """
+    """Puts the moments of a checkpoint into an AdamW; rates and decay are the settings'. Raises InputError where they
+    do not fit."""
     parameters = [parameter for group in optimiser.param_groups for parameter in group["params"]]
     stored = content["optimiser"]["state"]
     for index, moments in stored.items():
@@ -156,14 +145,8 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, content: dict, path: Pat
 
 
 def restore_generator(generator: torch.Generator, content: dict, path: Path) -> None:
-    """Restores the state of the run's random generator and of torch's own CPU generator.
-
-    A generator's state does not fit another device: a run that continues on one seeds its generator anew, from the seed
-    and the step. So does torch's generator on a GPU, which the occupancy grid draws from.
-
-    Raises:
-        InputError: The stored values are not states of generators.
-    """
+    """Restores the run's random generator and torch's own of the CPU. A state does not fit another device: a run that
+    continues on one seeds its generator anew, by seed and step. Raises InputError where the values are no states."""
     try:
         if content["device"] == generator.device.type:
             generator.set_state(content["generator"])
@@ -175,11 +158,8 @@ def restore_generator(generator: torch.Generator, content: dict, path: Path) -> 
 
 
 def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tensor, Tensor]:
-    """The stored values [r^3] and classes [r, r, r] of a grid's cells, on the grid's device.
-
-    Raises:
-        InputError: The checkpoint has another number of cells.
-    """
+    """The stored values [r^3] and classes [r, r, r] of a grid's cells, on its device. Raises InputError where there are
+    others."""
     stored = content["occupancy"], content["cells"]
     if stored[0].shape != grid.values.shape or stored[1].shape != grid.cells.shape:
         raise InputError(f"{path}: its occupancy grid does not fit the settings; leave grid_resolution as it was")
@@ -294,13 +274,10 @@ def _check_bits(cached: dict, k: int, n_vertices: int) -> None:
 
 def _check_sizes(config: Config, parameters: dict[str, Tensor]) -> None:
     """Raises ValueError where the settings need larger tensors than the file holds; the model is allocated next."""
-    c = config
-    grid = HashGridSpec(
-        c.surface.n_levels, N_FEATURES, c.constants.base_resolution, c.surface.growth, c.surface.log2_table_size
-    )
-    sizes = {"sdf_field.grid.table": grid.n_entries * N_FEATURES}
-    if c.light.kind == "pyramid":
-        sizes["light.texels"] = 3 * sum(4**k for k in range(2, c.light.resolution.bit_length()))
+    grid = grid_spec(config)
+    sizes = {"sdf_field.grid.table": grid.n_entries * grid.n_features}
+    if config.light.kind == "pyramid":
+        sizes["light.texels"] = 3 * sum(4**k for k in range(2, config.light.resolution.bit_length()))
     for name, size in sizes.items():
         if name not in parameters or parameters[name].numel() != size:
             raise ValueError(f"parameter {name} does not fit the settings")

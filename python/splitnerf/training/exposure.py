@@ -66,8 +66,8 @@ class PhotoExposures:
         counts = (target[:, 3] > COVERED) & (opacity.detach() > COVERED)
         counts &= ((photo > DARKEST) & (photo < BRIGHTEST)).all(1)
         counts = counts if allowed is None else counts & allowed
-        apart = photo.clamp(min=DARKEST).log() - mean.detach().clamp(min=1e-4).log() - self.start[view]
-        values = torch.cat([apart.clamp(-FARTHEST, FARTHEST), torch.ones_like(apart[:, :1])], dim=1)
+        difference = photo.clamp(min=DARKEST).log() - mean.detach().clamp(min=1e-4).log() - self.start[view]
+        values = torch.cat([difference.clamp(-FARTHEST, FARTHEST), torch.ones_like(difference[:, :1])], dim=1)
         self.sums.mul_(KEEP).index_add_(0, view, torch.where(counts[:, None], values, 0.0))
         self._update()
 

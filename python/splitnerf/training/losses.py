@@ -151,51 +151,37 @@ def loss_terms(
     return terms
 
 
-def penalty(error: Tensor, form: str) -> Tensor:
-    """Elementwise error^2 (`square`), or error^2 / 2 below 1 and |error| - 1/2 above (`smooth_l1`)."""
-    return error.square() if form == "square" else F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none")
-
-
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
     """Distance of g(w, rho) from the Monte Carlo integral of g(w, 0), for random directions and roughness.
 
     Half of the queries have rho = 1, the others a uniform rho in [0, 1]. Broad lobes share one set of light directions:
     a rotated lattice or, as published, random directions (``light_set``). A lobe below the roughness
     ``light_lobe_below`` samples its own directions from its density. The gradient flows into both sides. With
-    ``light_noise`` the set
-    consists of two halves; the difference of their two integrals decides the size of the set in later steps.
+    ``light_noise`` the set consists of two halves; the difference of their two integrals decides the size of the set in later steps.
 
     Source: SplitNeRF Eq. (11); the size of the set is our addition.
     """
-    c = config
-    n_sets, n = (
-        (2, light.loss_samples.count(c.constants.light_noise, c.constants.light_samples))
-        if c.constants.light_noise > 0
-        else (1, c.constants.light_samples)
-    )
+    c, n_sets = config.constants, 2 if config.constants.light_noise > 0 else 1
+    n = light.loss_samples.count(c.light_noise, c.light_samples) if n_sets == 2 else c.light_samples
     draw = {"generator": generator, "device": generator.device}
-    queries = F.normalize(torch.randn(c.constants.light_queries, 3, **draw), dim=1)
-    directions = torch.cat([light_directions(c, n // n_sets, queries, generator) for _ in range(n_sets)])
+    queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
+    directions = torch.cat([light_directions(config, n // n_sets, queries, generator) for _ in range(n_sets)])
     roughness = torch.ones_like(queries[:, :1])
-    roughness[: c.constants.light_queries // 2] = (
-        torch.rand(c.constants.light_queries // 2, 1, **draw).sort(0).values
-    )  # narrow lobes first
-    n_narrow = int((roughness < c.constants.light_lobe_below).sum()) if c.constants.light_lobe_below > 0 else 0
-    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.constants.light_lobe_samples, seed).reshape(-1, 3)
-    asked = torch.cat([directions, own, queries])
-    g = light(asked, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
+    roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
+    n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
+    own = sample_ggx_lobe(queries[:n_narrow], roughness[:n_narrow], c.light_lobe_samples, seed).reshape(-1, 3)
+    queried = torch.cat([directions, own, queries])
+    g = light(queried, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
-    sums = torch.stack(
-        [
-            prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part)
-            for part in zip(directions.chunk(n_sets), shared.chunk(n_sets))
-        ]
-    )
-    error = prefiltered - torch.cat([lobes.view(n_narrow, c.constants.light_lobe_samples, 3).mean(1), sums.mean(0)])
+    parts = zip(directions.chunk(n_sets), shared.chunk(n_sets))
+    sums = torch.stack([prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part) for part in parts])
+    error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums.mean(0)])
     if n_sets == 2:
         noise = ((sums[0] - sums[1]) / 2).square().sum().item()
         light.loss_samples.learn(noise, error[n_narrow:].square().sum().item(), n)
-    return penalty(error, c.constants.light_form).sum(-1).mean()
+    if c.light_form == "square":
+        return error.square().sum(-1).mean()
+    return F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none").sum(-1).mean()
 
 
 def light_directions(config: Config, n: int, queries: Tensor, generator: torch.Generator) -> Tensor:
@@ -228,24 +214,17 @@ def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor) -> Tensor:
 
 
 def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.Generator) -> Tensor:
-    """Mean squared log chroma of the diffuse light g(n, 1): the distance of its log channels from their mean.
-
-    Images of a diffuse object do not determine whether a colour is the object's or the light's. This loss prefers a
-    light without colour where the images allow it.
-    """
-    normals = F.normalize(
-        torch.randn(config.constants.neutral_queries, 3, generator=generator, device=generator.device), dim=1
-    )
+    """Mean squared log chroma of the diffuse light g(n, 1): images of a diffuse object do not say whether a colour is
+    the object's or the light's; without other evidence the light has none."""
+    n = config.constants.neutral_queries
+    normals = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
     log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
 
 
 def light_prior_loss(light: LightPyramid) -> Tensor:
-    """How far a light is from a smooth and grey one, see :func:`splitnerf.ops.light_prior`.
-
-    Many lights explain the photos of an object that is not a mirror. The log radiance of a texel is expected near that of the
-    coarser levels, and its channels near their mean; windows and lamps have edges, so a large deviation costs little more.
-    """
+    """How far a light is from a smooth and grey one: many lights explain the photos of an object that is not a
+    mirror."""
     return light_prior(light.texels, light.level_sizes)
 
 
@@ -273,16 +252,15 @@ class SeenLight:
             )
             weights = known.to(self._device) * texels.solid_angles / (4 * math.pi)
             self._target, self._weights = radiance.to(self._device).clamp(min=RADIANCE_FLOOR).log(), weights
-        apart = (texels.radiance.clamp(min=RADIANCE_FLOOR).log() - self._target) / SEEN_DEVIATION
-        return (torch.log1p(apart.square() / TAILS).mean(1) * self._weights).sum()
+        difference = (texels.radiance.clamp(min=RADIANCE_FLOOR).log() - self._target) / SEEN_DEVIATION
+        return (torch.log1p(difference.square() / TAILS).mean(1) * self._weights).sum()
 
 
 def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Generator) -> Tensor:
     """Quadratic entropy of the materials of surface points, -ln mean exp(-|x_i - x_j|^2 / 4) over all pairs.
 
     Images do not determine how bright a side of the object is and how bright its light is. This loss prefers the split
-    in
-    which the object has few materials: points of similar colour and gloss attract each other, and dissimilar points do
+    in which the object has few materials: points of similar colour and gloss attract each other, and dissimilar points do
     not. x holds log albedo, roughness and metallic, each divided by the width within which points count as similar.
 
     Source: Barron and Malik 2015 (SIRFS), section 4.2, for reflectance; the gloss is our addition.

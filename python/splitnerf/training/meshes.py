@@ -135,12 +135,8 @@ class SurfaceMesh:
 
 
 def make_mesh(model: SceneModel, network: SdfNetwork, aims: Tensor | None) -> TracedMesh | None:
-    """The zero level set of a field, traced in directions `aims` [k, 3]; None where it is empty. Only constants of the model
-    are read.
-
-    Raises:
-        RuntimeError: The field is not finite.
-    """
+    """The zero level set of a field, traced in directions `aims` [k, 3]; None where it is empty. Only constants of the
+    model are read. Raises RuntimeError where the field is not finite."""
     try:
         vertices, faces = extract_mesh(distances(network), model.config.constants.box, model.config.mesh.resolution)
     except EmptyMesh:

@@ -54,9 +54,14 @@ class StepLog:
         return numbers.step % LOG_EVERY == 0 or numbers.step <= LOG_EVERY
 
     def write(self) -> dict[str, object]:
-        """Adds the pending line to metrics.jsonl, and returns it."""
+        """Adds the pending line to metrics.jsonl, and returns it. Raises OSError where that is impossible; the folder may be
+        gone."""
         line, self.pending = self.pending, None
-        add_metrics(self.path, line)
+        try:
+            with open(self.path, "a", encoding="utf-8") as log:
+                log.write(json.dumps(line) + "\n")
+        except OSError as error:
+            raise OSError(f"{self.path}: cannot be written ({reason(error)})") from error
         return line
 
     def text(self, numbers: StepNumbers) -> str:
@@ -78,15 +83,6 @@ def keep_metrics(path: Path, step: int) -> None:
     lines = [json.dumps(line) for line in read_metrics(path) if line["step"] <= step]
     with atomic_path(path) as temporary:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-
-
-def add_metrics(path: Path, line: dict) -> None:
-    """Adds a line. Raises OSError where it cannot be written; the folder may be gone."""
-    try:
-        with open(path, "a", encoding="utf-8") as log:
-            log.write(json.dumps(line) + "\n")
-    except OSError as error:
-        raise OSError(f"{path}: cannot be written ({reason(error)})") from error
 
 
 def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> Path:

@@ -1,4 +1,4 @@
-"""What an observer of a run learns, and what it may request of the training."""
+"""What an observer of a run learns, what it may request of the training, and one that writes TensorBoard's files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from splitnerf.data.images import read_image
+from splitnerf.errors import InputError, note
+from splitnerf.files import reason
+
+if TYPE_CHECKING:
+    from torch.utils.tensorboard import SummaryWriter
 
 
 class Request(Enum):
@@ -52,3 +61,65 @@ def together(observers: Sequence[Observer]) -> Observer:
 
 
 NOBODY: Observer = together(())
+
+
+class TensorBoard:
+    """An observer that writes the lines of metrics.jsonl as scalars and the previews as images; within a block, which
+    closes the file.
+
+    Args:
+        folder: The folder of the event files; it is made when training begins.
+
+    Raises:
+        InputError: The package is not installed, or the path is a file.
+    """
+
+    def __init__(self, folder: Path):
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+        except ImportError:
+            raise InputError("--tensorboard: needs tensorboard; pip install 'splitnerf[tensorboard]'") from None
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"{folder}: is a file; give --tensorboard a folder")
+        self._folder, self._make, self._writer = folder, SummaryWriter, None
+
+    def __enter__(self) -> TensorBoard:
+        return self
+
+    def __call__(self, event: Event) -> None:
+        if event.kind == "begun":
+            self._begin(event.training.step)
+        elif event.kind == "logged":
+            numbers = {name: float(value) for name, value in event.line.items() if name != "step" and value is not None}
+            self._write(
+                lambda writer: [writer.add_scalar(name, value, event.line["step"]) for name, value in numbers.items()]
+            )
+        elif event.kind == "previewed":
+            pixels, step = np.ascontiguousarray(read_image(event.path)[..., :3]), event.training.step
+            self._write(
+                lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC")
+            )
+
+    def _begin(self, step: int) -> None:
+        """Opens the file; its steps after the one that the run goes on from come again. Raises InputError where that is
+        impossible."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{self._folder}: cannot be made ({reason(error)}); give --tensorboard another folder"
+            ) from None
+        self._writer = self._make(str(self._folder), purge_step=step + 1)
+
+    def __exit__(self, *exception) -> None:
+        self._write(lambda writer: writer.close())
+
+    def _write(self, write: Callable[[SummaryWriter], object]) -> None:
+        """Writes, as long as that is possible: a full disk ends the curves, not the training."""
+        if self._writer is None:
+            return
+        try:
+            write(self._writer)
+        except OSError as error:
+            self._writer = None
+            note(f"{self._folder}: cannot be written ({reason(error)}); TensorBoard gets no more of this run")

@@ -9,7 +9,7 @@ from splitnerf.config import Config
 from splitnerf.ops import AdamW
 from splitnerf.render.model import SceneModel
 
-FEWEST, MOST = 0.9, 1.05  # shares of the sample budget between which the ray count stays; a step has room for 1.15
+FEWEST, MOST = 0.9, 1.05  # shares of the sample budget between which the ray count stays; a step has a capacity of 1.15
 VARIANCE_RATE, LIGHT_RATE = 0.001, 0.02  # of the surface's sharpness and of the pyramid's texels
 WEIGHT_DECAY = 0.01
 RAY_UNITS = 16  # `cuda_graphs` uses this many ray counts between one power of 2 and the next
@@ -53,9 +53,9 @@ def make_optimiser(model: SceneModel, config: Config) -> AdamW:
     c, grid = config, model.sdf_field.grid
     texels = [model.light.texels] if c.light.kind == "pyramid" else []
     table = [grid.table] if c.constants.sparse_steps else []
-    apart = {id(p) for p in [model.variance, *texels, *table]}
+    separate = {id(p) for p in [model.variance, *texels, *table]}
     groups = [
-        ([p for p in model.parameters() if id(p) not in apart], c.constants.learning_rate, WEIGHT_DECAY),
+        ([p for p in model.parameters() if id(p) not in separate], c.constants.learning_rate, WEIGHT_DECAY),
         ([model.variance], VARIANCE_RATE, 0.0),
         (texels, LIGHT_RATE, 0.0),
         (table, c.constants.learning_rate, WEIGHT_DECAY),

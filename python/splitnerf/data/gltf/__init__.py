@@ -1,5 +1,3 @@
 """Reader of glTF 2.0 files, binary or not."""
 
 from splitnerf.data.gltf.reader import read_asset
-
-__all__ = ["read_asset"]

@@ -27,11 +27,8 @@ class Document:
     """A parsed glTF file; `json` is a dict with "asset"."""
 
     def __init__(self, path: Path):
-        """Reads the JSON and, of a GLB, the binary chunk.
-
-        Raises:
-            InputError: No such file, not glTF 2.0, or truncated.
-        """
+        """Reads the JSON and, of a GLB, the binary chunk. Raises InputError where there is no file, or it is not glTF
+        2.0."""
         self.path = path
         if not path.is_file():
             raise InputError(f"{path}: no such file; give a .glb or .gltf file")

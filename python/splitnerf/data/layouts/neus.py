@@ -80,15 +80,9 @@ def read_matrices(path: Path) -> list[np.ndarray]:
 
 
 def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """The pinhole of a projection K [R | t], up to a factor, from the world to pixels whose first centre is (0, 0);
-    messages call the matrix [4, 4] or [3, 4] by its name.
-
-    Returns:
-        [4] (fx, fy, cx, cy) with pixel centres at +0.5, and [4, 4] camera-to-world, OpenGL axes.
-
-    Raises:
-        InputError: It is no such projection.
-    """
+    """The pinhole of a projection K [R | t] [3 or 4, 4], up to a factor, from the world to pixels whose first centre is
+    (0, 0): [4] (fx, fy, cx, cy) with pixel centres at +0.5, and [4, 4] camera-to-world, OpenGL axes. Raises InputError,
+    which calls the matrix by its name, where it is none."""
     usable = matrix.shape in ((4, 4), (3, 4)) and matrix.dtype.kind in "fiu"
     part = matrix[:3].astype(np.float64) if usable else np.full((3, 4), np.nan)
     if not np.isfinite(part).all() or not abs(np.linalg.det(part[:, :3])) > 1e-30:
