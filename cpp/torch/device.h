@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "check.h"
+#include "register.h"
 #include "splitnerf/ops_cpu.h"
 #ifdef SPLITNERF_WITH_CUDA
 #include <torch/csrc/stable/accelerator.h>
@@ -103,18 +104,5 @@ template <class Body> void on_device(const Kind& kind, Body&& body) {
 #endif
   dispatch_real(kind, [&](auto zero) { body(zero, OnCpu{}); });
 }
-
-// SPLITNERF_IMPLEMENT(m) { m.impl(...); } registers operators for every device that this build serves.
-#ifdef SPLITNERF_WITH_CUDA
-#define SPLITNERF_IMPLEMENT_CUDA \
-  STABLE_TORCH_LIBRARY_IMPL(splitnerf, CUDA, library) { implement(library); }
-#else
-#define SPLITNERF_IMPLEMENT_CUDA
-#endif
-#define SPLITNERF_IMPLEMENT(m)                                               \
-  static void implement(torch::stable::detail::StableLibrary& m);            \
-  STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, library) { implement(library); } \
-  SPLITNERF_IMPLEMENT_CUDA                                                   \
-  static void implement(torch::stable::detail::StableLibrary& m)
 
 }  // namespace splitnerf::glue

@@ -70,10 +70,10 @@ Tensor dense_gradient(const char* op, const Tensor& grad, const Tensor& param, c
   return torch::stable::contiguous(grad);
 }
 
-void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vector<Tensor> exp_avgs,
-                 std::vector<Tensor> exp_avg_sqs, std::vector<double> lrs, double beta1, double beta2, double eps,
-                 std::vector<double> weight_decays, std::vector<int64_t> steps, std::vector<bool> sparse,
-                 std::vector<Tensor> copies, std::vector<int64_t> copied, std::optional<Tensor> allowed) {
+void adamw_steps_(std::vector<Tensor> params, std::vector<Tensor> grads, std::vector<Tensor> exp_avgs,
+                  std::vector<Tensor> exp_avg_sqs, std::vector<double> lrs, double beta1, double beta2, double eps,
+                  std::vector<double> weight_decays, std::vector<int64_t> steps, std::vector<bool> sparse,
+                  std::vector<Tensor> copies, std::vector<int64_t> copied, std::optional<Tensor> allowed) {
   const char* op = "adamw_steps_";
   const size_t n = params.size();
   require(n > 0, op, "params must hold a tensor");
@@ -115,13 +115,10 @@ void adamw_steps(std::vector<Tensor> params, std::vector<Tensor> grads, std::vec
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "adamw_steps_(Tensor(a!)[] params, Tensor[] grads, Tensor(b!)[] exp_avgs, Tensor(c!)[] exp_avg_sqs, float[] lrs, "
-      "float beta1, float beta2, float eps, float[] weight_decays, int[] steps, bool[] sparse, Tensor(d!)[] copies, "
-      "int[] copied, Tensor? allowed=None) -> ()");
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(adamw_steps_),
+     "params(a!) grads exp_avgs(b!) exp_avg_sqs(c!) lrs beta1 beta2 eps weight_decays steps sparse copies(d!) copied "
+     "allowed=None");
 }
-
-SPLITNERF_IMPLEMENT(m) { m.impl("adamw_steps_", TORCH_BOX(&adamw_steps)); }
 
 }  // namespace splitnerf::glue

@@ -58,18 +58,12 @@ Tensor hash_encode_backward_positions(Tensor positions, Tensor table, Tensor gra
 
 }  // namespace
 
-#define SPLITNERF_GRID "int n_levels, int base_resolution, float growth, int log2_table_size, int n_active"
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("hash_encode(Tensor positions, Tensor table, " SPLITNERF_GRID ", Tensor? stored=None) -> Tensor");
-  m.def("hash_encode_backward(Tensor positions, Tensor grad_features, " SPLITNERF_GRID ") -> Tensor");
-  m.def("hash_encode_backward_positions(Tensor positions, Tensor table, Tensor grad_features, " SPLITNERF_GRID
-        ") -> Tensor");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("hash_encode", TORCH_BOX(&hash_encode));
-  m.impl("hash_encode_backward", TORCH_BOX(&hash_encode_backward));
-  m.impl("hash_encode_backward_positions", TORCH_BOX(&hash_encode_backward_positions));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(hash_encode), "positions table n_levels base_resolution growth log2_table_size n_active stored=None");
+  op(SPLITNERF_OP(hash_encode_backward),
+     "positions grad_features n_levels base_resolution growth log2_table_size n_active");
+  op(SPLITNERF_OP(hash_encode_backward_positions),
+     "positions table grad_features n_levels base_resolution growth log2_table_size n_active");
 }
 
 }  // namespace splitnerf::glue

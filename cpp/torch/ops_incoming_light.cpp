@@ -76,14 +76,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> incoming_light(int64_t scene, Tensor 
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "incoming_light(int scene, Tensor positions, Tensor geometric_normals, Tensor normals, Tensor view_dirs, "
-      "Tensor albedo, Tensor roughness, Tensor metallic, Tensor vertex_normals, Tensor tangents, Tensor uv, "
-      "Tensor albedo_map, Tensor roughness_metallic_map, Tensor normal_map, Tensor environment, int n_directions, "
-      "int max_bounces, float clamp_indirect, int seed) -> (Tensor, Tensor, Tensor, Tensor)");
+SPLITNERF_CPU_OPERATORS(op) {
+  op(SPLITNERF_OP(incoming_light),
+     "scene positions geometric_normals normals view_dirs albedo roughness metallic vertex_normals tangents uv "
+     "albedo_map roughness_metallic_map normal_map environment n_directions max_bounces clamp_indirect seed");
 }
-
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) { m.impl("incoming_light", TORCH_BOX(&incoming_light)); }
 
 }  // namespace splitnerf::glue

@@ -97,25 +97,16 @@ Tensor sample_ggx_lobe(Tensor axes, Tensor roughness, int64_t n_samples, int64_t
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("prefilter_light(Tensor query_dirs, Tensor roughness, Tensor light_dirs, Tensor light) -> (Tensor, Tensor)");
-  m.def(
-      "prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor total, Tensor grad_gbar, "
-      "Tensor light_dirs) -> Tensor");
-  m.def("sample_ggx_lobe(Tensor axes, Tensor roughness, int n_samples, int seed) -> Tensor");
-  m.def(
-      "occlusion_factors(int scene, Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, "
-      "Tensor environment, int n_diffuse_rays, int n_specular_rays, float offset, bool along_ray, int seed) -> "
-      "(Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("prefilter_light", TORCH_BOX(&prefilter_light));
-  m.impl("prefilter_light_backward", TORCH_BOX(&prefilter_light_backward));
-  m.impl("sample_ggx_lobe", TORCH_BOX(&sample_ggx_lobe));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(prefilter_light), "query_dirs roughness light_dirs light");
+  op(SPLITNERF_OP(prefilter_light_backward), "query_dirs roughness total grad_gbar light_dirs");
+  op(SPLITNERF_OP(sample_ggx_lobe), "axes roughness n_samples seed");
 }
 
 // Rays are traced on the CPU.
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) { m.impl("occlusion_factors", TORCH_BOX(&occlusion_factors)); }
+SPLITNERF_CPU_OPERATORS(op) {
+  op(SPLITNERF_OP(occlusion_factors),
+     "scene positions normals lobe_dirs roughness environment n_diffuse_rays n_specular_rays offset along_ray seed");
+}
 
 }  // namespace splitnerf::glue

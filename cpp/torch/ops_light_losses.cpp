@@ -47,14 +47,9 @@ Tensor light_prior_backward(Tensor texels, std::vector<int64_t> level_sizes, Ten
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("light_prior(Tensor texels, int[] level_sizes) -> Tensor");
-  m.def("light_prior_backward(Tensor texels, int[] level_sizes, Tensor grad_loss) -> Tensor");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("light_prior", TORCH_BOX(&light_prior));
-  m.impl("light_prior_backward", TORCH_BOX(&light_prior_backward));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(light_prior), "texels level_sizes");
+  op(SPLITNERF_OP(light_prior_backward), "texels level_sizes grad_loss");
 }
 
 }  // namespace splitnerf::glue

@@ -117,22 +117,11 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directio
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets, "
-      "Tensor transposed_columns, Tensor transposed_weights, Tensor values) -> Tensor");
-  m.def(
-      "light_lookup(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
-      "Tensor nodes, Tensor zonal) -> Tensor");
-  m.def(
-      "light_lookup_backward(Tensor directions, Tensor roughness, Tensor levels, Tensor sh, Tensor resolutions, "
-      "Tensor nodes, Tensor zonal, Tensor grad_radiance) -> (Tensor, Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("sparse_product", TORCH_BOX(&sparse_product));
-  m.impl("light_lookup", TORCH_BOX(&light_lookup));
-  m.impl("light_lookup_backward", TORCH_BOX(&light_lookup_backward));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(sparse_product),
+     "offsets columns weights transposed_offsets transposed_columns transposed_weights values");
+  op(SPLITNERF_OP(light_lookup), "directions roughness levels sh resolutions nodes zonal");
+  op(SPLITNERF_OP(light_lookup_backward), "directions roughness levels sh resolutions nodes zonal grad_radiance");
 }
 
 }  // namespace splitnerf::glue

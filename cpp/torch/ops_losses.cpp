@@ -132,24 +132,12 @@ std::tuple<Tensor, Tensor> quadratic_entropy(Tensor x) {
 
 }  // namespace
 
-#define SPLITNERF_PIXELS \
-  "Tensor mean, Tensor opacity, Tensor target, Tensor background, Tensor? whole, Tensor? exposure, bool linear"
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("pixel_losses(" SPLITNERF_PIXELS ") -> Tensor");
-  m.def("pixel_losses_backward(" SPLITNERF_PIXELS ", Tensor grad_losses) -> (Tensor, Tensor)");
-  m.def("gradient_losses(Tensor gradients, Tensor weights, Tensor beside) -> (Tensor, Tensor)");
-  m.def(
-      "gradient_losses_backward(Tensor gradients, Tensor weights, Tensor beside, Tensor total, Tensor grad_losses) -> "
-      "Tensor");
-  m.def("quadratic_entropy(Tensor x) -> (Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("pixel_losses", TORCH_BOX(&pixel_losses));
-  m.impl("pixel_losses_backward", TORCH_BOX(&pixel_losses_backward));
-  m.impl("gradient_losses", TORCH_BOX(&gradient_losses));
-  m.impl("gradient_losses_backward", TORCH_BOX(&gradient_losses_backward));
-  m.impl("quadratic_entropy", TORCH_BOX(&quadratic_entropy));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(pixel_losses), "mean opacity target background whole exposure linear");
+  op(SPLITNERF_OP(pixel_losses_backward), "mean opacity target background whole exposure linear grad_losses");
+  op(SPLITNERF_OP(gradient_losses), "gradients weights beside");
+  op(SPLITNERF_OP(gradient_losses_backward), "gradients weights beside total grad_losses");
+  op(SPLITNERF_OP(quadratic_entropy), "x");
 }
 
 }  // namespace splitnerf::glue

@@ -196,37 +196,15 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> shade_sums_ba
 
 }  // namespace
 
-#define SPLITNERF_SUMMED_POINT                                                                        \
-  "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor sums, " \
-  "Tensor lut, bool compensate, "
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "monte_carlo_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
-      "Tensor radiance) -> Tensor");
-  m.def(
-      "summed_light(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor solid_angles, "
-      "Tensor radiance, Tensor visible, Tensor sent) -> Tensor");
-  m.def(
-      "summed_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor directions, Tensor "
-      "solid_angles, "
-      "Tensor radiance, Tensor visible, Tensor sent, Tensor grad_sums) -> "
-      "(Tensor, Tensor, Tensor)");
-  m.def(
-      "monte_carlo_light_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor light_dirs, Tensor pdf, "
-      "Tensor radiance, Tensor grad_sums) -> (Tensor, Tensor, Tensor)");
-  m.def("shade_sums(" SPLITNERF_SUMMED_POINT "Tensor? other, Tensor? share) -> Tensor");
-  m.def("shade_sums_backward(" SPLITNERF_SUMMED_POINT
-        "Tensor? other, Tensor? share, Tensor grad_radiance) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("summed_light", TORCH_BOX(&summed_light));
-  m.impl("summed_light_backward", TORCH_BOX(&summed_light_backward));
-  m.impl("monte_carlo_light", TORCH_BOX(&monte_carlo_light));
-  m.impl("monte_carlo_light_backward", TORCH_BOX(&monte_carlo_light_backward));
-  m.impl("shade_sums", TORCH_BOX(&shade_sums));
-  m.impl("shade_sums_backward", TORCH_BOX(&shade_sums_backward));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(monte_carlo_light), "normals view_dirs roughness light_dirs pdf radiance");
+  op(SPLITNERF_OP(summed_light), "normals view_dirs roughness directions solid_angles radiance visible sent");
+  op(SPLITNERF_OP(summed_light_backward),
+     "normals view_dirs roughness directions solid_angles radiance visible sent grad_sums");
+  op(SPLITNERF_OP(monte_carlo_light_backward), "normals view_dirs roughness light_dirs pdf radiance grad_sums");
+  op(SPLITNERF_OP(shade_sums), "normals view_dirs albedo roughness metallic sums lut compensate other share");
+  op(SPLITNERF_OP(shade_sums_backward),
+     "normals view_dirs albedo roughness metallic sums lut compensate other share grad_radiance");
 }
 
 }  // namespace splitnerf::glue

@@ -1,4 +1,4 @@
-// draw_rays, read_pixels, probe_points and place_samples as torch operators.
+// draw_rays and read_pixels as torch operators.
 #include <tuple>
 
 #include "device.h"
@@ -91,20 +91,10 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> read_pixels(Tensor codes, Tensor inde
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "draw_rays(Tensor random, int n_near, Tensor near_last, Tensor near_shift, int near_count, Tensor known_last, "
-      "Tensor known_shift, int known_count, Tensor matrices, Tensor origins, int height, int width) -> (Tensor, "
-      "Tensor, "
-      "Tensor, Tensor)");
-  m.def(
-      "read_pixels(Tensor codes, Tensor index, Tensor view, Tensor exposures, Tensor backgrounds, Tensor edge_starts, "
-      "Tensor edge_ends, Tensor edge_shift, Tensor edge_behind) -> (Tensor, Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("draw_rays", TORCH_BOX(&draw_rays));
-  m.impl("read_pixels", TORCH_BOX(&read_pixels));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(draw_rays),
+     "random n_near near_last near_shift near_count known_last known_shift known_count matrices origins height width");
+  op(SPLITNERF_OP(read_pixels), "codes index view exposures backgrounds edge_starts edge_ends edge_shift edge_behind");
 }
 
 }  // namespace splitnerf::glue

@@ -272,42 +272,17 @@ Tensor interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor secon
 
 }  // namespace
 
-#define SPLITNERF_SURFACE                                                                                    \
-  "Tensor sdf, Tensor gradient, Tensor rays_d, Tensor s, Tensor offsets, Tensor step, Tensor anneal, float " \
-  "min_transmittance, int n_samples"
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "march_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, float box, float step, "
-      "int max_samples) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def("surface_weights(" SPLITNERF_SURFACE "=-1) -> (Tensor, Tensor, Tensor)");
-  m.def("surface_weights_backward(" SPLITNERF_SURFACE
-        ", Tensor weights, Tensor grad_normals, Tensor grad_weights, Tensor grad_opacity) -> "
-        "(Tensor, Tensor, Tensor)");
-  m.def(
-      "spread_samples(Tensor weights, Tensor t, Tensor offsets, Tensor phase, float gap, int per_ray, int "
-      "max_shaded=-1, int max_stretches=-1, Tensor? unit=None) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, "
-      "Tensor, Tensor)");
-  m.def("interpolate(Tensor values, Tensor first, Tensor second, Tensor share) -> Tensor");
-  m.def(
-      "interpolate_backward(Tensor grad_interpolated, Tensor first, Tensor second, Tensor share, Tensor shaded) -> "
-      "Tensor");
-  m.def(
-      "composite(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity=None, float least_opacity=1) -> "
-      "Tensor");
-  m.def(
-      "composite_backward(Tensor weights, Tensor values, Tensor offsets, Tensor? opacity, float least_opacity, Tensor "
-      "grad_sums) -> (Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("march_rays", TORCH_BOX(&march_rays));
-  m.impl("surface_weights", TORCH_BOX(&surface_weights));
-  m.impl("surface_weights_backward", TORCH_BOX(&surface_weights_backward));
-  m.impl("spread_samples", TORCH_BOX(&spread_samples));
-  m.impl("interpolate", TORCH_BOX(&interpolate));
-  m.impl("interpolate_backward", TORCH_BOX(&interpolate_backward));
-  m.impl("composite", TORCH_BOX(&composite));
-  m.impl("composite_backward", TORCH_BOX(&composite_backward));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(march_rays), "rays_o rays_d jitter cells box step max_samples");
+  op(SPLITNERF_OP(surface_weights), "sdf gradient rays_d s offsets step anneal min_transmittance n_samples=-1");
+  op(SPLITNERF_OP(surface_weights_backward),
+     "sdf gradient rays_d s offsets step anneal min_transmittance n_samples weights grad_normals grad_weights "
+     "grad_opacity");
+  op(SPLITNERF_OP(spread_samples), "weights t offsets phase gap per_ray max_shaded=-1 max_stretches=-1 unit=None");
+  op(SPLITNERF_OP(interpolate), "values first second share");
+  op(SPLITNERF_OP(interpolate_backward), "grad_interpolated first second share shaded");
+  op(SPLITNERF_OP(composite), "weights values offsets opacity=None least_opacity=1");
+  op(SPLITNERF_OP(composite_backward), "weights values offsets opacity least_opacity grad_sums");
 }
 
 }  // namespace splitnerf::glue

@@ -180,29 +180,19 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor> sample_rays(
 
 }  // namespace
 
-#define SPLITNERF_SDF_FIELD                                                                               \
-  "Tensor positions, Tensor table, Tensor hidden, Tensor hidden_length, Tensor hidden_bias, Tensor out, " \
-  "Tensor out_length, Tensor out_bias, float beta, int n_levels, int base_resolution, float growth, "     \
-  "int log2_table_size, int n_active, float box"
-#define SPLITNERF_SDF_NETWORK                                                                                \
-  "Tensor table, Tensor hidden, Tensor hidden_bias, Tensor out, Tensor out_bias, float beta, int n_levels, " \
-  "int base_resolution, float growth, int log2_table_size, int n_active, float box"
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("sdf_field(" SPLITNERF_SDF_FIELD ", Tensor? stored=None) -> (Tensor, Tensor, Tensor)");
-  m.def("sdf_field_backward(" SPLITNERF_SDF_FIELD
-        ", Tensor grad_outputs, Tensor grad_features, Tensor grad_gradient) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
-  m.def("sdf_values(Tensor positions, " SPLITNERF_SDF_NETWORK ") -> Tensor");
-  m.def("sample_rays(Tensor rays_o, Tensor rays_d, Tensor jitter, Tensor cells, " SPLITNERF_SDF_NETWORK
-        ", float step, int max_samples, float s, float anneal, float min_weight, float min_transmittance, "
-        "float reach, float lipschitz, int capacity) -> (Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("sdf_field", TORCH_BOX(&sdf_field));
-  m.impl("sdf_field_backward", TORCH_BOX(&sdf_field_backward));
-  m.impl("sdf_values", TORCH_BOX(&sdf_values));
-  m.impl("sample_rays", TORCH_BOX(&sample_rays));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(sdf_field),
+     "positions table hidden hidden_length hidden_bias out out_length out_bias beta n_levels base_resolution growth "
+     "log2_table_size n_active box stored=None");
+  op(SPLITNERF_OP(sdf_field_backward),
+     "positions table hidden hidden_length hidden_bias out out_length out_bias beta n_levels base_resolution growth "
+     "log2_table_size n_active box grad_outputs grad_features grad_gradient");
+  op(SPLITNERF_OP(sdf_values),
+     "positions table hidden hidden_bias out out_bias beta n_levels base_resolution growth log2_table_size n_active "
+     "box");
+  op(SPLITNERF_OP(sample_rays),
+     "rays_o rays_d jitter cells table hidden hidden_bias out out_bias beta n_levels base_resolution growth "
+     "log2_table_size n_active box step max_samples s anneal min_weight min_transmittance reach lipschitz capacity");
 }
 
 }  // namespace splitnerf::glue

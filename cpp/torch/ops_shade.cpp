@@ -146,25 +146,15 @@ std::tuple<Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tenso
 
 }  // namespace
 
-#define SPLITNERF_POINT                                                                                   \
-  "Tensor normals, Tensor view_dirs, Tensor albedo, Tensor roughness, Tensor metallic, Tensor specular, " \
-  "Tensor? diffuse, Tensor occlusion_s, Tensor occlusion_d, Tensor lut, int fresnel_mode, bool compensate, "
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("light_queries(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean) -> (Tensor, Tensor)");
-  m.def(
-      "light_queries_backward(Tensor normals, Tensor view_dirs, Tensor roughness, Tensor lut, bool mean, "
-      "Tensor grad_directions, Tensor grad_asked_roughness) -> (Tensor, Tensor)");
-  m.def("split_sum_shade(" SPLITNERF_POINT "Tensor? indirect_s, Tensor? indirect_d) -> Tensor");
-  m.def("split_sum_shade_backward(" SPLITNERF_POINT
-        "Tensor? indirect_s, Tensor? indirect_d, Tensor grad_radiance) -> "
-        "(Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor)");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("light_queries", TORCH_BOX(&light_queries));
-  m.impl("light_queries_backward", TORCH_BOX(&light_queries_backward));
-  m.impl("split_sum_shade", TORCH_BOX(&split_sum_shade));
-  m.impl("split_sum_shade_backward", TORCH_BOX(&split_sum_shade_backward));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(light_queries), "normals view_dirs roughness lut mean");
+  op(SPLITNERF_OP(light_queries_backward), "normals view_dirs roughness lut mean grad_directions grad_asked_roughness");
+  op(SPLITNERF_OP(split_sum_shade),
+     "normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d lut fresnel_mode compensate "
+     "indirect_s indirect_d");
+  op(SPLITNERF_OP(split_sum_shade_backward),
+     "normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d lut fresnel_mode compensate "
+     "indirect_s indirect_d grad_radiance");
 }
 
 }  // namespace splitnerf::glue

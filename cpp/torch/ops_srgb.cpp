@@ -42,16 +42,10 @@ Tensor srgb_to_linear(Tensor srgb) {
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def("linear_to_srgb(Tensor linear) -> Tensor");
-  m.def("linear_to_srgb_backward(Tensor linear, Tensor grad_srgb) -> Tensor");
-  m.def("srgb_to_linear(Tensor srgb) -> Tensor");
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("linear_to_srgb", TORCH_BOX(&linear_to_srgb));
-  m.impl("linear_to_srgb_backward", TORCH_BOX(&linear_to_srgb_backward));
-  m.impl("srgb_to_linear", TORCH_BOX(&srgb_to_linear));
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(linear_to_srgb), "linear");
+  op(SPLITNERF_OP(linear_to_srgb_backward), "linear grad_srgb");
+  op(SPLITNERF_OP(srgb_to_linear), "srgb");
 }
 
 }  // namespace splitnerf::glue

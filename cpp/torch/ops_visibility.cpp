@@ -134,29 +134,18 @@ std::tuple<Tensor, Tensor> cached_visibility(Tensor positions, Tensor normals, T
 
 }  // namespace
 
-STABLE_TORCH_LIBRARY_FRAGMENT(splitnerf, m) {
-  m.def(
-      "visibility_bits(int scene, Tensor positions, Tensor normals, Tensor directions, float offset, bool with_hits) "
-      "-> (Tensor, Tensor)");
-  m.def("vertex_grids(Tensor vertices, float radius, int n_levels) -> (Tensor, Tensor)");
-  m.def(
-      "cached_occlusion(Tensor positions, Tensor normals, Tensor lobe_dirs, Tensor roughness, Tensor vertices, "
-      "Tensor vertex_normals, Tensor starts, Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, "
-      "Tensor directions, Tensor light) -> (Tensor, Tensor, Tensor, Tensor)");
-  m.def(
-      "cached_visibility(Tensor positions, Tensor normals, Tensor vertices, Tensor vertex_normals, Tensor starts, "
-      "Tensor order, float radius, Tensor bits, Tensor hits, Tensor radiance, Tensor directions) -> "
-      "(Tensor, Tensor)");
+SPLITNERF_OPERATORS(op) {
+  op(SPLITNERF_OP(cached_occlusion),
+     "positions normals lobe_dirs roughness vertices vertex_normals starts order radius bits hits radiance directions "
+     "light");
+  op(SPLITNERF_OP(cached_visibility),
+     "positions normals vertices vertex_normals starts order radius bits hits radiance directions");
 }
 
-STABLE_TORCH_LIBRARY_IMPL(splitnerf, CPU, m) {
-  m.impl("visibility_bits", TORCH_BOX(&visibility_bits));
-  m.impl("vertex_grids", TORCH_BOX(&vertex_grids));
-}
-
-SPLITNERF_IMPLEMENT(m) {
-  m.impl("cached_occlusion", TORCH_BOX(&cached_occlusion));
-  m.impl("cached_visibility", TORCH_BOX(&cached_visibility));
+// Rays are traced on the CPU.
+SPLITNERF_CPU_OPERATORS(op) {
+  op(SPLITNERF_OP(visibility_bits), "scene positions normals directions offset with_hits");
+  op(SPLITNERF_OP(vertex_grids), "vertices radius n_levels");
 }
 
 }  // namespace splitnerf::glue
