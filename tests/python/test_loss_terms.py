@@ -66,11 +66,6 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
     assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
-def test_nothing_but_the_papers_terms(rendered):
-    """The occlusion's comes with the first mesh."""
-    assert set(rendered[3]) == {"colour", "eikonal", "light", "metal"} and rendered[3]["light"].weight == 10.0
-
-
 # ---- all terms at once, each with a weight of its own ----
 
 WEIGHTS = dict(colour_weight=0.11, eikonal_weight=0.13, mask_weight=0.17, light_weight=0.19, neutral_weight=0.23)

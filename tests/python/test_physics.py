@@ -21,29 +21,6 @@ def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
     )
 
 
-def test_occlusion_loss_is_the_weighted_square_of_what_is_off(monkeypatch):
-    """Eq. (16) with known factors: w (0.1^2 + 0.3^2) and w (0.2^2 + 0), w normalised."""
-    config = Config().replace({"occlusion_share": 1.1, "occlusion_channels": 1})
-    truth = torch.tensor([[0.5], [0.5]]), torch.tensor([[0.2], [1.0]])
-    asked = {}
-    monkeypatch.setattr(losses, "occlusion_factors", lambda *args, **kwargs: asked.update(args=args, **kwargs) or truth)
-    ray = rays([0.75, 0.25], [0.0, 0.0])
-    ray.positions, ray.sdf, ray.normals = (
-        torch.ones(2, 3),
-        torch.tensor([0.1, 0.0]),
-        F.one_hot(torch.tensor([2, 2]), 3).float(),
-    )
-    ray.points.lobe_dirs, ray.points.roughness = F.one_hot(torch.tensor([0, 1]), 3).float(), torch.ones(2, 1)
-    ray.points.occlusion_d, ray.points.occlusion_s = torch.tensor([[0.6], [0.3]]), torch.tensor([[0.5], [1.0]])
-    loss = losses.occlusion_loss(ray, None, None, config, torch.Generator().manual_seed(0), 0)
-    assert loss.item() == pytest.approx(0.75 * 0.1 + 0.25 * 0.04)
-    torch.testing.assert_close(asked["args"][1], torch.tensor([[1.0, 1.0, 0.9], [1.0, 1.0, 1.0]]))  # onto the surface
-    assert torch.equal(asked["args"][3], ray.points.lobe_dirs)
-    published = config.replace({"occlusion_directional": False})
-    losses.occlusion_loss(ray, None, None, published, torch.Generator().manual_seed(0), 0)
-    assert torch.equal(asked["args"][3], ray.normals)
-
-
 def test_the_sets_of_light_directions():
     queries = F.normalize(torch.randn(5, 3), dim=1)
     for name, count in (("fibonacci", 400), ("uniform", 400), ("uniform_and_queries", 405)):
