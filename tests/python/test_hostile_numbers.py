@@ -75,21 +75,3 @@ def test_bits_of_points_that_are_none(ball, value):
     others = torch.arange(20) != 4
     assert torch.equal(good[others], found[others]) and torch.equal(hits[others], their_hits[others])
     assert bit_counts(found[4:5, 1]) == 0 and (their_hits[4] < 0).all() and bit_counts(good[4:5, 1]) > 0
-
-
-def test_a_cache_without_vertices_is_refused():
-    """There is none to look up."""
-    none, integers = torch.zeros(0, 3), {"dtype": torch.int32}
-    cache = (
-        none,
-        none,
-        torch.zeros(2, 5, **integers),
-        torch.zeros(2, 0, **integers),
-        0.1,
-        torch.zeros(0, 2, 2, **integers),
-        torch.zeros(0, 0, **integers),
-        none,
-        torch.nn.functional.normalize(torch.ones(64, 3), dim=1),
-    )
-    with pytest.raises(ValueError, match="cached_visibility: vertices must hold at least one"):
-        lib.cached_visibility(ABOVE[None], -DOWN[None], *cache)

@@ -198,7 +198,8 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):
         found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0).item())
     positions, normals, lobes, number = asked[0]
     assert 30 < len(number) < 90 and number.unique().equal(number)
-    for part, own in ((positions + 0.5 * normals, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
+    on_ray = positions + 0.5 * normals
+    for part, own in ((on_ray, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.0, 0.5])):
         assert torch.equal(part, number[:, None] + torch.tensor(own))
     w = 1.0 + number
     expected = (w @ ((0.002**2 + 0.004**2) * number.square()) / w.sum()).item()

@@ -120,12 +120,6 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_in_use_is_refused(tmp_path, capsys):
-    with held(tmp_path / "out") as owner:
-        assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == BAD_INPUT
-        assert f"in use by pid {owner.pid} on " in capsys.readouterr().err
-
-
 # ---- shares ----
 
 LAPTOP, NODE = {"CPU": 2.0, "memory": 6 * GB}, {"CPU": 16.0, "GPU": 2.0, "memory": 64 * GB}

@@ -103,6 +103,7 @@ ERRORS = [
     ("cached_occlusion", 7, lambda order: order + 1, "order"),
     ("cached_occlusion", 11, lambda radiance: radiance[:, :2], "radiance"),
     ("cached_visibility", 1, without, "normals"),
+    ("cached_visibility", (2, 3, 5, 7, 8, 9), lambda x: x[:, :0] if len(x) == 4 else x[:0], "must hold at least one"),
     ("visibility_bits", 2, without, "normals must be [9, 3]"),
     ("visibility_bits", 3, without, "multiple of 32"),
     ("vertex_grids", 1, lambda radius: 0.0, "radius"),

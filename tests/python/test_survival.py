@@ -204,6 +204,7 @@ def test_a_run_in_use_is_refused(data, done, capsys):
             ["train", data, "--out", run, "--resume", "auto"],
             ["demo", "--out", run, "--overwrite"],
             ["export", run],
+            ["batch", data, "--out", run],
             ["evaluate", run, "--data", data],
             ["refine", run, "--data", data, "--out", run],
         ):
