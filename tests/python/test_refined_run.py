@@ -390,7 +390,10 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
     print_refinement(summary)
-    assert f"colours {before:.2f} -> {after:.2f} dB, coverage at the outline" in capsys.readouterr().out
+    held = "of photos held out {:.2f} -> {:.2f} dB".format(*summary["held_out_psnr"])
+    assert f"colours {before:.2f} -> {after:.2f} dB, {held}, coverage at the outline" in capsys.readouterr().out
+    print_refinement(summary | {"delivered": 0})
+    assert "no step helped the photos held out" in capsys.readouterr().out
     print_refinement(None)
     assert capsys.readouterr().out == ""
 
@@ -419,7 +422,15 @@ def test_the_reports_numbers_are_those_of_its_pictures():
     photo = np.full((8, 8, 3), 0.5)
     page = {
         "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1]}],
-        "summary": {"steps": 3, "seconds": 9.0, "photos_psnr": [20.0, 30.0], "outline_error": None, "saturated": 0.125},
+        "summary": {
+            "steps": 3,
+            "seconds": 9.0,
+            "photos_psnr": [20.0, 30.0],
+            "outline_error": None,
+            "saturated": 0.125,
+            "held_out_psnr": [21.0, 29.0],
+            "delivered": 2,
+        },
         "lights": [np.ones((4, 8, 3))] * 2,
     }
     section = refinement_section(page)

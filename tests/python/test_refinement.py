@@ -144,12 +144,12 @@ def test_errors_are_those_of_srgb_at_the_brightest_pixel_around(painted):
 def test_each_batch_has_directions_of_its_own(painted):
     asset, data = painted
     fit = Refinement(data, asset, sky(), FitSettings(pixels=64))
-    _, samples = fit.see()
+    _, samples = fit.see(fit.fitted, fit.random)
     texels, shares = fit.texels.rows(samples.footprints), samples.footprints.weights
     colours = []
-    for fit.n_batches in (0, 0, 1):
+    for seed in (0, 0, 1):
         unknowns = (fit.unknowns[texels] * shares[..., None]).sum(1)
-        colours.append(fit.shade(fit.surface(), samples, unknowns).colours.detach())
+        colours.append(fit.shade(fit.surface(), samples, unknowns, seed=seed).colours.detach())
     assert torch.equal(colours[0], colours[1]) and not torch.equal(colours[0], colours[2])
 
 

@@ -129,10 +129,15 @@ def print_refinement(summary: dict | None) -> None:
     """A line with the changes by the refinement, if there was one."""
     if summary is None:
         return
-    changes = ["colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"])]
+    changes = [
+        "colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"]),
+        "of photos held out {:.2f} -> {:.2f} dB".format(*summary["held_out_psnr"]),
+    ]
     if summary["outline_error"]:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
     print(f"refinement, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
+    if summary["delivered"] == 0:
+        print("no step helped the photos held out: the asset has the textures and the light of the training")
 
 
 def print_scores(evaluation: dict) -> None:

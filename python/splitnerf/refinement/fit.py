@@ -32,7 +32,7 @@ from splitnerf.refinement.level import at_level, level_of_light
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
-from splitnerf.refinement.pixels import PixelFilter, covered_pixels
+from splitnerf.refinement.pixels import HELD_OUT, PixelFilter, covered_pixels, held_out
 from splitnerf.refinement.similar_texels import usual_gloss
 from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, materials_of, patch_width
 from splitnerf.refinement.unknowns import (
@@ -60,6 +60,7 @@ ANCHOR = 0.02  # distance from the start
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
 LEAST_BATCHES = 8  # of a sweep, however short the time
+HELD_SEED = 1 << 30  # of the directions for pixels held out
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
 
 
@@ -108,6 +109,29 @@ class Shaded(NamedTuple):
     sky: Tensor
 
 
+class Observed(NamedTuple):
+    """b pixels of photos, each seen by two rays.
+
+    Attributes:
+        texels, shares: [2 b, 4] where the rays' points read the textures.
+        unknowns: [2 b, 7] a leaf of the graph.
+        shaded: The light that the points send.
+        weights: [b, 3] of the squared errors.
+        errors: [b, 2, 3] of the rays' colours.
+    """
+
+    texels: Tensor
+    shares: Tensor
+    unknowns: Tensor
+    shaded: Shaded
+    weights: Tensor
+    errors: Tensor
+
+    def squared(self) -> Tensor:
+        """[b] squared errors without noise, in expectation."""
+        return (self.weights * self.errors[:, 0] * self.errors[:, 1]).mean(1)
+
+
 class Refinement:
     """The state of a fit.
 
@@ -135,7 +159,10 @@ class Refinement:
         self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns)
         seen = dataset.surroundings if self.turns is None else None
         self.light_equations = LightEquations(self.light, surroundings=seen)
-        self.groups = None if self.turns is None else groups_of(dataset.light_turns, self.pixels.view)
+        held = held_out(self.pixels)
+        self.fitted, self.held = (
+            Draws(np.flatnonzero(chosen), self.pixels.view, dataset.light_turns) for chosen in (~held, held)
+        )
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)
@@ -201,14 +228,11 @@ class Refinement:
         """The asset as it is now, for the tracer."""
         return TexturedSurface(self.scene, *self.vertex_values, *self.maps())
 
-    def see(self) -> tuple[np.ndarray, SurfaceSamples]:
+    def see(self, draws: Draws, random: np.random.Generator) -> tuple[np.ndarray, SurfaceSamples]:
         """Draws a batch: numbers of pixels [b] whose two rays both meet the asset, and the rays' points [2 b]."""
         n = self.settings.pixels
-        if self.groups is None:
-            index = self.random.integers(0, len(self.pixels), n)
-        else:
-            index = self.random.choice(self.groups[self._group()], n)
-        offsets = np.stack([self.filter.draw(n, self.random) for _ in range(2)], axis=1)
+        index = draws(n, random)
+        offsets = np.stack([self.filter.draw(n, random) for _ in range(2)], axis=1)
         origins, directions = (part.reshape(-1, 3) for part in self.pixels.rays(index, offsets))
         triangle, u, v = self.scene.trace_closest(origins, directions)
         hit = (triangle >= 0).reshape(n, 2).all(axis=1)
@@ -217,13 +241,13 @@ class Refinement:
         both = np.repeat(hit, 2)
         return index[hit], self.texels.sample(triangle[both], u[both], v[both], -directions[both])
 
-    def _group(self) -> int:
-        """A group of pixels, by its share of all."""
-        sizes = np.array([len(group) for group in self.groups])
-        return int(self.random.choice(len(sizes), p=sizes / sizes.sum()))
-
     def shade(
-        self, surface: TexturedSurface, samples: SurfaceSamples, unknowns: Tensor, turns: Tensor | None = None
+        self,
+        surface: TexturedSurface,
+        samples: SurfaceSamples,
+        unknowns: Tensor,
+        turns: Tensor | None = None,
+        seed: int = 0,
     ) -> Shaded:
         """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives.
 
@@ -246,7 +270,7 @@ class Refinement:
             n_directions=s.directions,
             max_bounces=BOUNCES,
             clamp_indirect=CLAMP_INDIRECT,
-            seed=s.seed + self.n_batches,
+            seed=seed,
         )
         towards = arriving.directions if turns is None else arriving.directions @ turns.transpose(1, 2)
         texels, shares = footprints(self.light.height, towards.reshape(-1, 3))
@@ -258,21 +282,35 @@ class Refinement:
         colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
         return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
 
-    def gather(self, surface: TexturedSurface) -> float:
-        """Gathers one batch of pixels; returns its mean squared error without noise."""
-        (index, samples), photos = self.see(), self.pixels
+    def observe(self, surface: TexturedSurface, draws: Draws, random: np.random.Generator, seed: int) -> Observed:
+        """A batch of pixels as photos show it and as it is now."""
+        (index, samples), photos = self.see(draws, random), self.pixels
         texels, shares = self.texels.rows(samples.footprints), samples.footprints.weights
         unknowns = (self.unknowns[texels] * shares[..., None]).sum(1).requires_grad_(True)
-        turns = None if self.turns is None else self.turns[self.pixels.view[index]].repeat_interleave(2, 0)
-        shaded = self.shade(surface, samples, unknowns, turns)
-        colours = shaded.colours
+        turns = None if self.turns is None else self.turns[photos.view[index]].repeat_interleave(2, 0)
+        shaded = self.shade(surface, samples, unknowns, turns, seed)
         target, brightest, saturated = (
             torch.from_numpy(x[index]) for x in (photos.target, photos.brightest, photos.saturated)
         )
-        pairs = colours.detach().view(-1, 2, 3)
+        pairs = shaded.colours.detach().view(-1, 2, 3)
         weights = srgb_slope(brightest.clamp(min=MIN_TONE)).square()
         weights = torch.where(saturated & (pairs.mean(1) > target), 0.0, weights)
-        errors = pairs - target[:, None]
+        return Observed(texels, shares, unknowns, shaded, weights, pairs - target[:, None])
+
+    @torch.no_grad()
+    def held_errors(self) -> np.ndarray:
+        """[n] mean squared errors without noise of batches of pixels that are held out: of the same ones by the same rays
+        at each call."""
+        surface, random = self.surface(), np.random.default_rng(self.settings.seed)
+        n = max(LEAST_BATCHES, self.batches_of_a_sweep() // HELD_OUT)
+        batches = (self.observe(surface, self.held, random, HELD_SEED + k) for k in range(n))
+        return np.array([float(batch.squared().mean()) for batch in batches])
+
+    def gather(self, surface: TexturedSurface) -> float:
+        """Gathers one batch of pixels; returns its mean squared error without noise."""
+        batch = self.observe(surface, self.fitted, self.random, self.settings.seed + self.n_batches)
+        texels, shares, unknowns, shaded, weights, errors = batch
+        colours = shaded.colours
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
         if self.settings.light_step > 0:
@@ -284,9 +322,13 @@ class Refinement:
             [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
         )
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
-        squared = (weights * errors[:, 0] * errors[:, 1]).mean(1)
         self.n_batches += 1
-        return float(squared.mean())
+        return float(batch.squared().mean())
+
+    def batches_of_a_sweep(self) -> int:
+        """The batches of a sweep that has the time for all."""
+        s = self.settings
+        return max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
 
     def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> tuple[float, list[float]]:
         """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step.
@@ -300,7 +342,7 @@ class Refinement:
             The error, and the step's size by unknown.
         """
         s, surface, started = self.settings, self.surface(), time.monotonic()
-        n_batches = max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
+        n_batches = self.batches_of_a_sweep()
         errors: list[float] = []
         while len(errors) < n_batches and (
             len(errors) < LEAST_BATCHES or time.monotonic() - started + self.step_seconds < seconds
@@ -329,6 +371,29 @@ class Refinement:
         self.equations.move(step)
         self.step_seconds = time.monotonic() - gathered
         return error, step.square().mean(0).sqrt().tolist()
+
+
+class Draws:
+    """Draws batches of some pixels, with equal chances; with turns, each batch of photos whose lights have about one
+    rotation.
+
+    Args:
+        numbers: [m] the pixels.
+        view: [n] the photo of each pixel, of all pixels.
+        turns: [views, 3, 3] rotations, or None.
+    """
+
+    def __init__(self, numbers: np.ndarray, view: np.ndarray, turns: np.ndarray | None):
+        self.numbers = numbers
+        groups = [np.arange(len(numbers))] if turns is None else groups_of(turns, view[numbers])
+        self._groups = [numbers[group] for group in groups]
+
+    def __call__(self, n: int, random: np.random.Generator) -> np.ndarray:
+        """[n] pixels."""
+        group = 0
+        if len(self._groups) > 1:
+            group = int(random.choice(len(self._groups), p=[len(g) / len(self.numbers) for g in self._groups]))
+        return random.choice(self._groups[group], n)
 
 
 def groups_of(turns: np.ndarray, view: np.ndarray) -> list[np.ndarray]:

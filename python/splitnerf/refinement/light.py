@@ -39,7 +39,12 @@ class EnvironmentLight:
 
     def radiance(self) -> Tensor:
         """[h, 2 h, 3] linear radiance."""
-        return sum_of_levels(self.levels).exp().permute(1, 2, 0).contiguous()
+        return radiance_of(self.levels)
+
+
+def radiance_of(levels: list[Tensor]) -> Tensor:
+    """[h, 2 h, 3] the linear radiance of levels from coarse to fine."""
+    return sum_of_levels(levels).exp().permute(1, 2, 0).contiguous()
 
 
 def doubled(level: Tensor) -> Tensor:

@@ -17,6 +17,7 @@ from splitnerf.data.pixels import per_channel
 MIN_ALPHA = 0.99  # of a pixel that the object covers
 MOST = 1 << 25  # covered pixels of a fit, about: 1.4 GB
 NEARBY = 0.01  # pixels to either side over which a density is a mean
+HELD_OUT, BLOCK = 8, 8  # one in so many photos or blocks is held out; pixels along the edge of a block
 SATURATED = 254.5 / 255.0  # share of a photo's largest sRGB value from which on it is a lower bound
 
 
@@ -122,6 +123,16 @@ def brightest_around(photo: np.ndarray) -> np.ndarray:
 def covered_pixels(dataset: Dataset) -> Pixels:
     """The pixels of a split that the object covers, or a random share of them."""
     return pixels_of(dataset, lambda i: dataset.images[i, ..., 3] >= MIN_ALPHA, MOST)
+
+
+def held_out(pixels: Pixels) -> np.ndarray:
+    """[n] bool, the pixels by which a fit is judged and not made: those of every eighth photo or, of fewer than 16 photos,
+    of an eighth of the photos' blocks."""
+    views = np.unique(pixels.view)
+    if len(views) >= 2 * HELD_OUT:
+        return np.isin(pixels.view, views[HELD_OUT // 2 :: HELD_OUT])
+    column, row = np.floor(pixels.centre / BLOCK).astype(np.int64).T
+    return (column + 3 * row + 5 * pixels.view) % HELD_OUT == 0
 
 
 class PixelFilter:

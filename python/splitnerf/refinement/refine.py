@@ -31,7 +31,7 @@ from splitnerf.refinement.stage import Refined, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
-STATE, STATE_FORMAT = "refinement.pt", 3
+STATE, STATE_FORMAT = "refinement.pt", 4
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
@@ -221,6 +221,8 @@ def record_of(refined: Refined, seconds: float) -> dict:
         "lamp": lamp,
         "level": refined.level,
         "saturated": refined.saturated,
+        "held_out": list(refined.held),
+        "delivered": refined.delivered,
         "sweeps": [sweep._asdict() for sweep in refined.sweeps],
     }
 
@@ -234,6 +236,8 @@ def refinement_summary(run: Path) -> dict:
         "seconds": record["seconds"],
         "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
         "outline_error": [outline[0], outline[-1]] if outline else None,
+        "held_out_psnr": [decibels(error) for error in record["held_out"]],
+        "delivered": record["delivered"],
         "saturated": record["saturated"],
     }
 

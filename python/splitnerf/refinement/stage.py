@@ -16,9 +16,14 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.lamps import CompactLamp
+from splitnerf.refinement.light import radiance_of
 from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.texels import check_form
+from splitnerf.refinement.unknowns import to_values
 
+BIASED = 1.05  # factor on the error of held-out pixels at the start, which training has fitted, as the trained asset has them
+SIGMAS = 2.0  # by which the best sweep must be better than the last one to be delivered in its place
+PATIENCE = 6  # sweeps after the best one, after which the fit ends
 LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
 OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
 
@@ -33,6 +38,8 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: The report of each sweep.
+        held: The error of held-out pixels before the first sweep, and with what is delivered.
+        delivered: The number of the sweep that is delivered; 0 for the start.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
         level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`.
@@ -42,6 +49,8 @@ class Refined:
     light: np.ndarray
     outline: list[float]
     sweeps: list[Sweep]
+    held: tuple[float, float]
+    delivered: int
     saturated: float
     lamp: CompactLamp | None
     level: float
@@ -56,12 +65,29 @@ class Sweep(NamedTuple):
         error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of
             the brightest pixel around; it may come out slightly negative.
         moved: [7] root mean square of the step, by unknown.
+        held: Mean squared error of held-out pixels after it.
     """
 
     number: int
     seconds: float
     error: float
     moved: list[float]
+    held: float
+
+
+class Candidate(NamedTuple):
+    """What may be delivered: the number of its sweep, the errors of batches of held-out pixels, the texels' unknowns and
+    the levels of the light."""
+
+    number: int
+    held: list[float]
+    unknowns: torch.Tensor
+    light: list[torch.Tensor]
+
+    def is_worse(self, other: Candidate) -> bool:
+        """Whether the errors are larger than another's by SIGMAS standard errors of their difference."""
+        more = np.array(self.held) - other.held
+        return bool(more.mean() > SIGMAS * more.std(ddof=1) / math.sqrt(len(more)))
 
 
 def decibels(error: float) -> float:
@@ -71,6 +97,9 @@ def decibels(error: float) -> float:
 
 class Stage:
     """A refinement, sweep by sweep, with a state from which another process can continue.
+
+    An eighth of the photos is not fitted. PATIENCE sweeps after the one that left these photos the smallest error the fit
+    ends. The texels and the light after the last sweep are delivered, unless that one, or the start, is clearly better.
 
     The minutes limit it: after OUTLINE_SHARE of them no further round of the outline begins, except the first, and no
     lamp is searched for. A sweep takes at most a LEAST_SWEEPS-th of them, the last one the rest. One sweep is always
@@ -102,6 +131,7 @@ class Stage:
         check_form(asset)
         self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
         self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
+        self.best: Candidate | None = None
         if state is not None:
             check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
             asset = replace(asset, vertices=state["vertices"].numpy())
@@ -114,9 +144,26 @@ class Stage:
         if state is not None:
             self.fit.restore(state["fit"])
             self.lamp = None if state["lamp"] is None else CompactLamp(*state["lamp"])
-        elif settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
+            self.held_start = float(state["held_start"])
+            self.best, self.last = (self._checked(state[name]) for name in ("best", "last"))
+            return
+        if settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
             show(self.progress, "refinement, looking for a lamp")
             self.lamp = self.fit.make_lamp_compact()
+        start = self.fit.held_errors()
+        self.held_start = float(start.mean())
+        self.best = self.last = self._candidate(0, BIASED * start)
+
+    def _candidate(self, number: int, held: np.ndarray) -> Candidate:
+        return Candidate(number, held.tolist(), self.fit.unknowns, self.fit.light.levels)
+
+    def _checked(self, stored: list) -> Candidate:
+        """A candidate of a state. Raises ValueError or TypeError where it belongs to another fit."""
+        candidate = Candidate(*stored)
+        check_tensor("unknowns", candidate.unknowns, tuple(self.fit.unknowns.shape), torch.float32)
+        for level, kept in zip(self.fit.light.levels, candidate.light, strict=True):
+            check_tensor("a level of the light", kept, tuple(level.shape), torch.float32)
+        return candidate._replace(held=list(map(float, candidate.held)))
 
     def _begins(self, turn: int) -> bool:
         """Whether there is time for a round of the outline as long as those before; always for the first."""
@@ -137,7 +184,8 @@ class Stage:
     def finished(self) -> bool:
         """Whether all sweeps are made, or what is left of the minutes is less than half of a sweep like the last
         one."""
-        if len(self.sweeps) >= self.settings.sweeps:
+        useless = self.best is not None and len(self.sweeps) >= self.best.number + PATIENCE
+        if useless or len(self.sweeps) >= self.settings.sweeps:
             return True
         return bool(self.sweeps) and self.limit - self.seconds <= 0.5 * self.last_seconds
 
@@ -156,8 +204,13 @@ class Stage:
             seconds = min(seconds, self.limit - started)
         message = self.message(len(self.sweeps) + 1)
         error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
+        number = len(self.sweeps) + 1
+        self.last = self._candidate(number, self.fit.held_errors())
+        held = float(np.mean(self.last.held))
+        if held < np.mean(self.best.held):
+            self.best = self.last
         self.last_seconds = self.seconds - started
-        self.sweeps.append(Sweep(len(self.sweeps) + 1, self.seconds, error, moved))
+        self.sweeps.append(Sweep(number, self.seconds, error, moved, held))
         return self.sweeps[-1]
 
     def message(self, step: int) -> str:
@@ -175,15 +228,20 @@ class Stage:
             "sweeps": [list(sweep) for sweep in self.sweeps],
             "lamp": None if self.lamp is None else list(self.lamp),
             "seconds": self.seconds,
+            "held_start": self.held_start,
+            "best": list(self.best),
+            "last": list(self.last),
             "fit": self.fit.state(),
         }
 
     def result(self) -> Refined:
         """The result so far."""
-        fit = self.fit
-        light, saturated = fit.light.radiance().detach().numpy(), float(fit.pixels.saturated.mean())
-        asset = fit.texels.asset_with(fit.maps())
-        return Refined(asset, light, self.outline, self.sweeps, saturated, self.lamp, fit.level)
+        fit, chosen = self.fit, self.best if self.last.is_worse(self.best) else self.last
+        asset = fit.texels.asset_with(fit.texels.maps(to_values(chosen.unknowns)))
+        light = radiance_of(chosen.light).numpy()
+        held = (self.held_start, float(np.mean(chosen.held)) if chosen.number else self.held_start)
+        saturated = float(fit.pixels.saturated.mean())
+        return Refined(asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level)
 
 
 def refine(

@@ -1,0 +1,126 @@
+"""Pixels that are held out of a refinement, and what they decide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from painted_ball import sky
+from splitnerf.refinement.fit import FitSettings, Refinement
+from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
+from splitnerf.refinement.stage import PATIENCE, Candidate, Stage
+
+SETTINGS = FitSettings(sweeps=3, pixels=128, directions=4, outline=False)
+
+
+def pixels_of_views(n: int, size: int = 64) -> Pixels:
+    row, column = (part.ravel() for part in np.indices((size, size)))
+    centre = np.tile(np.stack([column, row], axis=1) + np.float32(0.5), (n, 1))
+    return Pixels(np.repeat(np.arange(n), size * size), centre, *[np.zeros(0)] * 5)
+
+
+def test_of_many_photos_whole_ones_are_held_out():
+    pixels = pixels_of_views(32)
+    held = held_out(pixels)
+    assert np.unique(pixels.view[held]).tolist() == [4, 12, 20, 28]
+    assert held.sum() == 4 * 64 * 64
+
+
+def test_of_few_photos_an_eighth_of_the_blocks_is():
+    """In each photo, and none of them the same in two photos that follow."""
+    pixels = pixels_of_views(3)
+    held = held_out(pixels).reshape(3, 64, 64)
+    blocks = held.reshape(3, 8, 8, 8, 8).mean(axis=(2, 4))
+    assert np.isin(blocks, (0, 1)).all() and blocks.sum(axis=(1, 2)).tolist() == [64 / HELD_OUT] * 3
+    assert not (held[:-1] & held[1:]).any()
+
+
+def test_held_out_pixels_are_not_fitted_and_their_error_is_one_number(painted):
+    """The same at each call, whatever the fit has drawn; none where all is true."""
+    asset, data = painted
+    fit = Refinement(data, asset, sky(), SETTINGS)
+    assert not np.intersect1d(fit.fitted.numbers, fit.held.numbers).size
+    assert len(fit.fitted.numbers) + len(fit.held.numbers) == len(fit.pixels)
+    drawn = np.concatenate([fit.see(fit.fitted, fit.random)[0] for _ in range(8)])
+    assert not held_out(fit.pixels)[drawn].any()
+    error = fit.held_errors().mean()
+    fit.gather(fit.surface())
+    assert fit.held_errors().mean() == error and abs(error) < 1e-3
+    fit.unknowns = fit.unknowns + 0.1
+    assert fit.held_errors().mean() > 10 * abs(error)
+
+
+def ruined_after(monkeypatch, n: int) -> None:
+    """Sweeps that halve what the albedo lacks of the truth, and after n of them make it worse."""
+    sweep = Refinement.sweep
+
+    def changed(self, *arguments):
+        before = self.unknowns
+        result = sweep(self, *arguments)
+        away = 0.5 * self.wrong if self.n_sweeps <= n else -1.5 * self.wrong
+        self.unknowns = before - away
+        self.wrong = self.wrong - away
+        return result
+
+    monkeypatch.setattr(Refinement, "sweep", changed)
+
+
+def begun(painted, sweeps: int) -> Stage:
+    """A stage that begins with a wrong albedo."""
+    asset, data = painted
+    stage = Stage(data, asset, sky(), FitSettings(sweeps, pixels=128, directions=4, outline=False, light_step=0.0))
+    stage.fit.wrong = torch.zeros_like(stage.fit.unknowns)
+    stage.fit.wrong[:, :3] = 0.1
+    stage.fit.unknowns = stage.fit.unknowns + stage.fit.wrong
+    start = stage.fit.held_errors()
+    stage.held_start, stage.best = float(start.mean()), stage._candidate(0, start)
+    return stage
+
+
+def test_what_is_worse_by_chance_is_not_worse():
+    """A paired test: noise that two candidates share does not count, a few batches of their own do not decide."""
+    shared = np.random.default_rng(0).normal(5.0, 2.0, 16)
+    one = Candidate(1, list(shared), None, None)
+    assert Candidate(2, list(shared + 0.1 + 0.05 * np.arange(16) % 0.1), None, None).is_worse(one)
+    assert not Candidate(2, list(shared + np.where(np.arange(16) == 3, 1.6, 0.0)), None, None).is_worse(one)
+    assert not Candidate(2, list(shared - 1.0), None, None).is_worse(one) and not one.is_worse(one)
+
+
+@pytest.mark.parametrize("good", [0, 2])
+def test_what_is_best_on_held_out_pixels_is_delivered(painted, monkeypatch, good):
+    """Not what the last sweep left; the start where no sweep helped. And the fit ends where nothing gains."""
+    ruined_after(monkeypatch, good)
+    stage = begun(painted, sweeps=100)
+    wanted = [stage.fit.unknowns]
+    while not stage.finished:
+        stage.advance()
+        wanted.append(stage.fit.unknowns)
+    refined = stage.result()
+    assert len(stage.sweeps) == good + PATIENCE and refined.delivered == good
+    assert torch.equal(stage.best.unknowns, wanted[good]) and not torch.equal(stage.fit.unknowns, wanted[good])
+    albedo = stage.fit.texels.maps(torch.as_tensor(stage.fit.texels.start))[0]  # of the truth
+    error = np.abs(refined.asset.materials[0].albedo_texture - albedo.numpy()).max()
+    assert error < (0.1 if good else 0.3) and refined.held[1] <= refined.held[0]
+    assert (refined.held[1] < 0.3 * refined.held[0]) == bool(good)
+
+
+def test_a_stage_goes_on_with_its_best(painted):
+    asset, data = painted
+    stage = Stage(data, asset, sky(), SETTINGS)
+    while not stage.finished:
+        stage.advance()
+    again = Stage(data, asset, sky(), SETTINGS, stage.state())
+    assert (
+        again.best[:2] == stage.best[:2] and again.last[:2] == stage.last[:2] and again.held_start == stage.held_start
+    )
+    assert torch.equal(again.best.unknowns, stage.best.unknowns)
+    for ours, theirs in zip(
+        again.result().asset.materials[0].__dict__.values(), stage.result().asset.materials[0].__dict__.values()
+    ):
+        assert np.array_equal(ours, theirs)
+    with pytest.raises(KeyError, match="last"):
+        Stage(data, asset, sky(), SETTINGS, {key: value for key, value in stage.state().items() if key != "last"})
+    broken = stage.state()
+    broken["best"][2] = broken["best"][2][:5]
+    with pytest.raises(ValueError, match="unknowns"):
+        Stage(data, asset, sky(), SETTINGS, broken)
