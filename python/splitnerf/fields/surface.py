@@ -124,23 +124,10 @@ class SdfField(nn.Module):
 
         Differentiable once in all parameters (not in positions).
         """
-        return SdfSample(
-            *sdf_field(
-                positions,
-                self.grid.table,
-                self.hidden_direction,
-                self.hidden_length,
-                self.hidden_bias,
-                self.out_direction,
-                self.out_length,
-                self.out_bias,
-                SOFTPLUS_BETA,
-                self.box,
-                self.grid.spec,
-                self.grid.n_active,
-                self.grid.stored(),
-            )
-        )
+        hidden = self.hidden_direction, self.hidden_length, self.hidden_bias
+        out = self.out_direction, self.out_length, self.out_bias
+        grid = self.grid.spec, self.grid.n_active, self.grid.stored()
+        return SdfSample(*sdf_field(positions, self.grid.table, *hidden, *out, SOFTPLUS_BETA, self.box, *grid))
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
         """The values of :meth:`sample`, with the gradient by central differences (six evaluations).

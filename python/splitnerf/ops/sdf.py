@@ -274,16 +274,8 @@ class SdfNetwork(NamedTuple):
 
     def arguments(self) -> tuple:
         """The arguments that the operators take for a network."""
-        return (
-            self.table,
-            self.hidden,
-            self.hidden_bias,
-            self.out,
-            self.out_bias,
-            self.beta,
-            *self.spec.arguments(self.n_active),
-            self.box,
-        )
+        weights = self.hidden, self.hidden_bias, self.out, self.out_bias, self.beta
+        return self.table, *weights, *self.spec.arguments(self.n_active), self.box
 
 
 def sdf_field(
@@ -395,22 +387,8 @@ def sample_rays(
         The kept samples; [n_rays] int64, the number of distances per ray that the search asked for (on a GPU more are
         evaluated: a group of neighbours at once); and [] int64, the number of samples that were found.
     """
-    *samples, evaluated, found = lib.sample_rays(
-        rays_o,
-        rays_d,
-        jitter,
-        cells,
-        *network.arguments(),
-        step,
-        max_samples,
-        s,
-        anneal,
-        min_weight,
-        min_transmittance,
-        reach,
-        lipschitz,
-        capacity,
-    )
+    rules = step, max_samples, s, anneal, min_weight, min_transmittance, reach, lipschitz, capacity
+    *samples, evaluated, found = lib.sample_rays(rays_o, rays_d, jitter, cells, *network.arguments(), *rules)
     return PackedSamples(*samples), evaluated, found
 
 

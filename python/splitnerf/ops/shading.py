@@ -116,22 +116,10 @@ def split_sum_shade(
     """
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
-    return lib.split_sum_shade(
-        normals,
-        view_dirs,
-        albedo,
-        roughness,
-        metallic,
-        specular,
-        diffuse,
-        occlusion_s,
-        occlusion_d,
-        brdf_lut(normals.device),
-        FRESNEL_MODES.index(fresnel_mode),
-        compensate,
-        indirect_s,
-        indirect_d,
-    )
+    points = normals, view_dirs, albedo, roughness, metallic
+    light = specular, diffuse, occlusion_s, occlusion_d
+    options = brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate
+    return lib.split_sum_shade(*points, *light, *options, indirect_s, indirect_d)
 
 
 register(

@@ -209,6 +209,12 @@ class VisibilityCache:
         moved = (getattr(self, field.name) for field in fields(self))
         return VisibilityCache(*(x.to(device) if isinstance(x, Tensor) else x for x in moved))
 
+    def arguments(self, radiance: Tensor | None) -> tuple:
+        """The arguments that the operators take for a cache, with the radiance [m, 3] of what is hit, or None."""
+        hits, sent = (self.hits[:, :0], self.vertices[:0]) if radiance is None else (self.hits, radiance)
+        grids = self.vertices, self.normals, self.starts, self.order, self.radius
+        return *grids, self.bits, hits, sent, self.directions
+
     def n_bytes(self) -> int:
         """The memory of all its tensors."""
         tensors = (self.vertices, self.normals, self.directions, self.bits, self.hits, self.starts, self.order)
@@ -257,23 +263,8 @@ def cached_occlusion(
 
     Source: SplitNeRF Eq. (12)-(15) as sums over fixed directions.
     """
-    hits = cache.hits if radiance is not None else cache.hits[:, :0]
-    o_d, o_s, i_d, i_s = lib.cached_occlusion(
-        positions,
-        normals,
-        lobe_dirs,
-        roughness,
-        cache.vertices,
-        cache.normals,
-        cache.starts,
-        cache.order,
-        cache.radius,
-        cache.bits,
-        hits,
-        cache.vertices[:0] if radiance is None else radiance,
-        cache.directions,
-        light,
-    )
+    points = positions, normals, lobe_dirs, roughness
+    o_d, o_s, i_d, i_s = lib.cached_occlusion(*points, *cache.arguments(radiance), light)
     return (o_d, o_s, None, None) if radiance is None else (o_d, o_s, i_d, i_s)
 
 
@@ -291,20 +282,7 @@ def cached_visibility(
         visible: [n, k] open shares V_i in [0, 1]; 1 where no vertex counts.
         arriving: [n, k, 3] light (1 - V_i) C_i from the mesh, 0 below the horizon; None without ``radiance``.
     """
-    hits = cache.hits if radiance is not None else cache.hits[:, :0]
-    visible, arriving = lib.cached_visibility(
-        positions,
-        normals,
-        cache.vertices,
-        cache.normals,
-        cache.starts,
-        cache.order,
-        cache.radius,
-        cache.bits,
-        hits,
-        cache.vertices[:0] if radiance is None else radiance,
-        cache.directions,
-    )
+    visible, arriving = lib.cached_visibility(positions, normals, *cache.arguments(radiance))
     return visible, (None if radiance is None else arriving)
 
 
@@ -409,27 +387,10 @@ def incoming_light(
 
     Source: Veach 1997 (multiple importance sampling); Heitz 2018 (visible normals).
     """
-    directions, solid_angles, visible, sent = lib.incoming_light(
-        surface.scene.handle,
-        positions,
-        geometric_normals,
-        normals,
-        view_dirs,
-        albedo,
-        roughness,
-        metallic,
-        surface.normals,
-        surface.tangents,
-        surface.uv,
-        surface.albedo_map,
-        surface.roughness_metallic_map,
-        surface.normal_map,
-        environment,
-        n_directions,
-        max_bounces,
-        clamp_indirect,
-        seed,
-    )
+    points = positions, geometric_normals, normals, view_dirs, albedo, roughness, metallic
+    numbers = n_directions, max_bounces, clamp_indirect, seed
+    found = lib.incoming_light(surface.scene.handle, *points, *surface[1:], environment, *numbers)
+    directions, solid_angles, visible, sent = found
     pdf = torch.where(solid_angles > 0, 1.0 / (n_directions * solid_angles), 0.0)
     return IncomingLight(directions, pdf, visible, sent)
 

@@ -228,38 +228,14 @@ class SceneModel(nn.Module):
         """
         c = self.config
         inputs = self.head_inputs(positions, outputs, features)
-        albedo, roughness, metallic = self.material(*inputs)
+        _, roughness, _ = materials = self.material(*inputs)
         queries = light_queries(normals, view_dirs, roughness, c.shading.query)
         lobe_dirs, facing = queries[0].chunk(2)
         surface = on_surface(positions, normals, outputs[:, 0])
-        occlusion = self.occlusion_at(inputs, surface, facing, lobe_dirs, roughness, segments)
-        shaded = split_sum_shade(
-            normals,
-            view_dirs,
-            albedo,
-            roughness,
-            metallic,
-            light(*queries),
-            None,
-            occlusion.specular,
-            occlusion.diffuse,
-            c.shading.fresnel,
-            c.shading.compensate,
-            occlusion.indirect_specular,
-            occlusion.indirect_diffuse,
-        )
-        return ShadedPoints(
-            shaded,
-            normals,
-            albedo,
-            roughness,
-            metallic,
-            occlusion.diffuse,
-            occlusion.specular,
-            facing,
-            lobe_dirs,
-            surface,
-        )
+        o_d, o_s, i_d, i_s = self.occlusion_at(inputs, surface, facing, lobe_dirs, roughness, segments)
+        options = c.shading.fresnel, c.shading.compensate
+        shaded = split_sum_shade(normals, view_dirs, *materials, light(*queries), None, o_s, o_d, *options, i_s, i_d)
+        return ShadedPoints(shaded, normals, *materials, o_d, o_s, facing, lobe_dirs, surface)
 
     def quadrature_correction(
         self,
@@ -272,8 +248,7 @@ class SceneModel(nn.Module):
         """The difference between the radiance by quadrature and that by the split sum.
 
         The quadrature sums BRDF times light over the directions of the visibility bits. It replaces the split sum with
-        a
-        smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
+        a smooth transition in roughness, where the directions resolve the lobe: with 256 directions the transition is
         from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 
         Args:
@@ -293,35 +268,12 @@ class SceneModel(nn.Module):
         """
         middle, half = self.cells.summed_from, 0.5 * SUMMED_BAND
         at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
-        of_points = [
-            points.normals,
-            points.albedo,
-            points.roughness,
-            points.metallic,
-            points.radiance,
-            view_dirs,
-            points.on_surface,
-            points.facing.detach(),
-        ]
-        normals, albedo, roughness, metallic, split, view_dirs, on_surface, facing = (
-            x.index_select(0, at) for x in of_points
-        )
-        visible, sent = self.bits.visibility(on_surface, facing)
-        return at, summed_correction(
-            normals,
-            view_dirs,
-            albedo,
-            roughness,
-            metallic,
-            split,
-            share,
-            self.bits.cache.directions,
-            light.cells.solid_angles,
-            light.cells.radiance,
-            visible,
-            sent,
-            self.config.shading.compensate,
-        )
+        places = (x.index_select(0, at) for x in (points.on_surface, points.facing.detach()))
+        incoming = light.cells.solid_angles, light.cells.radiance, *self.bits.visibility(*places)
+        shaded = points.normals, view_dirs, points.albedo, points.roughness, points.metallic, points.radiance
+        corrected = (x.index_select(0, at) for x in shaded)
+        directions, compensate = self.bits.cache.directions, self.config.shading.compensate
+        return at, summed_correction(*corrected, share, directions, *incoming, compensate)
 
     def use_turns(self, turns: Tensor | None) -> None:
         """Sets the rotations [views, 3, 3] of the photos' light; None: it stands still. That of the cached occlusion is
@@ -403,18 +355,7 @@ class SceneModel(nn.Module):
             sky = g(lobes, (roughness**4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]
             specular, one = torch.where(mirrored[:, None] < 0, sky, seen), torch.ones_like(roughness)
-            shaded = split_sum_shade(
-                normals,
-                views,
-                albedo,
-                roughness,
-                metallic,
-                specular,
-                diffuse[vertices],
-                one,
-                one,
-                c.fresnel,
-                c.compensate,
-            )
-            parts.append(shaded * facing)
+            light_here = specular, diffuse[vertices], one, one
+            points = normals, views, albedo, roughness, metallic
+            parts.append(split_sum_shade(*points, *light_here, c.fresnel, c.compensate) * facing)
         bits.set_radiance(torch.cat(parts))
