@@ -219,7 +219,7 @@ void check_material(const char* caller, const SurfaceMaterial& m) {
 void check_surface(const char* caller, const Scene& scene, const Surface& surface, const EnvironmentMap& environment) {
   const Checks check{caller};
   check.require(environment.height > 0 && environment.width > 0, "the environment map must not be empty");
-  const int64_t n = surface.per_triangle ? scene.n_triangles() : scene.n_vertices();
+  const int64_t n = scene.n_vertices();
   check.range(surface.albedo, n * 3, 1.f, "albedo must lie in [0, 1]");
   check.range(surface.roughness, n, 1.f, "roughness must lie in [0, 1]");
   check.range(surface.metallic, n, 1.f, "metallic must lie in [0, 1]");

@@ -27,15 +27,9 @@ class SurfaceLookup {
     p.position = at.mean3(vertices);
     p.geometric_normal = normalize(cross(b - a, c - a), 1e-36f);
     if (dot(p.geometric_normal, view) < 0) p.geometric_normal = -p.geometric_normal;
-    if (surface_.per_triangle) {
-      p.albedo = load3(surface_.albedo + int64_t(hit.triangle) * 3);
-      p.roughness = surface_.roughness[hit.triangle];
-      p.metallic = surface_.metallic[hit.triangle];
-    } else {
-      p.albedo = at.mean3(surface_.albedo);
-      p.roughness = at.mean1(surface_.roughness);
-      p.metallic = at.mean1(surface_.metallic);
-    }
+    p.albedo = at.mean3(surface_.albedo);
+    p.roughness = at.mean1(surface_.roughness);
+    p.metallic = at.mean1(surface_.metallic);
     const SurfaceMaterial* material = nullptr;
     Vec2<float> uv{0, 0};
     if (surface_.material_ids) {

@@ -155,15 +155,11 @@ void raise_what_signals_ask() {
 
 py::dict render(const PyScene& self, const py::object& albedo, const py::object& roughness, const py::object& metallic,
                 const py::object& environment, const py::object& camera_to_world, float fx, float fy, float cx,
-                float cy, int width, int height, const py::object& normals, const std::string& materials_per,
-                const PyMaterials* materials, const py::object& material_ids, const py::object& uv,
-                const py::object& tangents, int spp, int max_bounces, uint32_t seed, bool light_sampling,
-                float clamp_indirect, const std::string& filter, const std::optional<float>& catcher_height) {
-  if (materials_per != "vertex" && materials_per != "triangle") {
-    throw py::value_error("render: materials_per must be 'vertex' or 'triangle', got '" + materials_per + "'");
-  }
-  const bool per_triangle = materials_per == "triangle";
-  const py::ssize_t n = per_triangle ? self.scene->n_triangles() : self.scene->n_vertices();
+                float cy, int width, int height, const py::object& normals, const PyMaterials* materials,
+                const py::object& material_ids, const py::object& uv, const py::object& tangents, int spp,
+                int max_bounces, uint32_t seed, float clamp_indirect, const std::string& filter,
+                const std::optional<float>& catcher_height) {
+  const py::ssize_t n = self.scene->n_vertices();
   const auto albedos = checked<float>("render", "albedo", albedo, {n, 3});
   const auto roughnesses = checked<float>("render", "roughness", roughness, {n});
   const auto metallics = checked<float>("render", "metallic", metallic, {n});
@@ -178,7 +174,7 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
 
   splitnerf::Camera camera{{}, fx, fy, cx, cy, width, height};
   std::copy_n(pose.data(), 12, camera.camera_to_world);
-  splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(), per_triangle,
+  splitnerf::Surface surface{albedos.data(), roughnesses.data(), metallics.data(),
                              normals.is_none() ? nullptr : shading.data()};
   Array<int32_t> ids;
   Array<float> uvs, frames;
@@ -197,14 +193,9 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
     surface.tangents = frames.data();
   }
   const splitnerf::EnvironmentMap light{map.data(), int(map.shape(0)), int(map.shape(1))};
-  const splitnerf::PathTracerParams params{spp,
-                                           max_bounces,
-                                           seed,
-                                           light_sampling,
-                                           clamp_indirect,
-                                           pixel_filter(filter),
-                                           catcher_height.has_value(),
-                                           catcher_height.value_or(0.f)};
+  splitnerf::PathTracerParams params{spp, max_bounces, seed};
+  params.clamp_indirect = clamp_indirect, params.filter = pixel_filter(filter);
+  params.shadow_catcher = catcher_height.has_value(), params.catcher_height = catcher_height.value_or(0.f);
 
   py::dict images;
   const auto allocate = [&](const char* name, int channels) {
@@ -286,13 +277,11 @@ void bind_scene(py::module_& m) {
   m.def("render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
         py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
         py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-        py::arg("materials_per") = "vertex", py::arg("materials") = py::none(), py::arg("material_ids") = py::none(),
-        py::arg("uv") = py::none(), py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4,
-        py::arg("seed") = 0, py::arg("light_sampling") = true, py::arg("clamp_indirect") = 0.f,
-        py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
+        py::arg("materials") = py::none(), py::arg("material_ids") = py::none(), py::arg("uv") = py::none(),
+        py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
+        py::arg("clamp_indirect") = 0.f, py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
         "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
-        "albedo [n, 3], roughness [n], metallic [n]: in [0, 1], linear, per vertex or per triangle "
-        "(materials_per).\n"
+        "albedo [n_vertices, 3], roughness [n_vertices], metallic [n_vertices]: in [0, 1], linear.\n"
         "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
         "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
         "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"

@@ -20,8 +20,6 @@ namespace py = pybind11;
 PYBIND11_MODULE(_core, m) {
   m.doc() = "Embree scenes, the path tracer, marching cubes and build information of SplitNeRF.";
 
-  m.attr("DIELECTRIC_F0") = splitnerf::kDielectricF0;
-  m.attr("SATURATED") = splitnerf::kSaturated;
   m.def(
       "hash_grid_levels",
       [](int64_t n_levels, int64_t n_features, int64_t base_resolution, double growth, int64_t log2_table_size) {
@@ -51,18 +49,6 @@ PYBIND11_MODULE(_core, m) {
         return lut;
       },
       "F1, F2, chi and E_d over (roughness, sqrt(n.v)) as a [32, 32, 4] float32 array.");
-
-  m.def(
-      "integrate_brdf",
-      [](double n_dot_v, double roughness, int n_points) {
-        if (!(n_dot_v > 0 && n_dot_v <= 1 && roughness >= 0 && roughness <= 1 && n_points > 0))
-          throw py::value_error("integrate_brdf: n_dot_v must be in (0, 1], roughness in [0, 1], n_points positive");
-        const splitnerf::LobeIntegrals entry = splitnerf::integrate_brdf(n_dot_v, roughness, n_points);
-        return py::make_tuple(entry.f1, entry.f2, entry.chi, entry.dielectric);
-      },
-      py::arg("n_dot_v"), py::arg("roughness"), py::arg("n_points"),
-      "F1, F2, chi and E_d by quadrature over 2 n_points microfacet normals: an entry of brdf_lut before it is "
-      "rounded.");
 
   m.def(
       "fibonacci_sphere",

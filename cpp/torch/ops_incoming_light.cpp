@@ -54,7 +54,7 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> incoming_light(int64_t scene, Tensor 
   check_material(op, material);
   const std::vector<float> ones(mesh->n_vertices() * 3, 1.f);
   const std::vector<int32_t> ids(mesh->n_triangles(), 0);
-  Surface surface{ones.data(), ones.data(), ones.data(), false, in<float>(vn)};
+  Surface surface{ones.data(), ones.data(), ones.data(), in<float>(vn)};
   surface.materials = &material;
   surface.n_materials = 1;
   surface.material_ids = ids.data();

@@ -38,7 +38,7 @@ struct RenderJob {
     std::vector<float> colours;
     for (size_t i = 0; i < n; ++i) colours.insert(colours.end(), {albedo.x, albedo.y, albedo.z});
     const std::vector<float> rough(n, roughness), metal(n, metallic);
-    Surface surface{colours.data(), rough.data(), metal.data(), false, smooth ? mesh.vertices.data() : nullptr};
+    Surface surface{colours.data(), rough.data(), metal.data(), smooth ? mesh.vertices.data() : nullptr};
     adapt(surface);
     Image image;
     const RenderTargets targets = image.targets(size_t(camera.width) * camera.height);

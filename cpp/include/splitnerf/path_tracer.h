@@ -44,10 +44,9 @@ SPLITNERF_API void check_material(const char* caller, const SurfaceMaterial& mat
 
 // Materials and normals of a mesh. All arrays are read during the call only.
 struct Surface {
-  const float* albedo;     // [n, 3] linear, in [0, 1]
-  const float* roughness;  // [n] perceptual, in [0, 1]
-  const float* metallic;   // [n] in [0, 1]
-  bool per_triangle;       // n = number of triangles; else one entry a vertex, interpolated
+  const float* albedo;     // [n_vertices, 3] linear, in [0, 1], interpolated as the next two
+  const float* roughness;  // [n_vertices] perceptual, in [0, 1]
+  const float* metallic;   // [n_vertices] in [0, 1]
   const float* normals;    // [n_vertices, 3] shading normals, or null for flat shading
 
   // Optional, and multiplied with the above: the material of each triangle.
