@@ -1,10 +1,6 @@
-#include "bindings_light.h"
+#include "bindings.h"
 
-#include <pybind11/numpy.h>
-
-#include <algorithm>
 #include <string>
-#include <vector>
 
 #include "splitnerf/light_tables.h"
 #include "splitnerf/spherical_harmonics.h"
@@ -12,13 +8,6 @@
 namespace py = pybind11;
 
 namespace {
-
-template <class To, class From>
-py::array_t<To> to_array(const std::vector<From>& values, py::array::ShapeContainer shape) {
-  py::array_t<To> out(std::move(shape));
-  std::copy(values.begin(), values.end(), out.mutable_data());
-  return out;
-}
 
 py::tuple to_tuple(const splitnerf::SparseMatrix& matrix) {
   const auto n = static_cast<py::ssize_t>(matrix.columns.size());

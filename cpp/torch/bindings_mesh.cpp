@@ -1,11 +1,7 @@
 // Marching cubes on NumPy arrays: check, call without the GIL, hand the vectors over.
-#include "bindings_mesh.h"
+#include "bindings.h"
 
-#include <pybind11/numpy.h>
-
-#include <algorithm>
 #include <string>
-#include <vector>
 
 #include "splitnerf/marching_cubes.h"
 
@@ -36,12 +32,6 @@ BlockGrid checked_grid(const char* function, const Values& values, const Index& 
   return {int(index.shape(0)), index.data(), values.data()};
 }
 
-template <class T> py::array_t<T> as_array(const std::vector<T>& values, py::ssize_t columns) {
-  py::array_t<T> out({py::ssize_t(values.size()) / columns, columns});
-  std::copy(values.begin(), values.end(), out.mutable_data());
-  return out;
-}
-
 }  // namespace
 
 void bind_mesh(py::module_& m) {
@@ -58,7 +48,7 @@ void bind_mesh(py::module_& m) {
           py::gil_scoped_release release;
           found = splitnerf::blocks_to_open(grid);
         }
-        return as_array(found, 1).reshape({py::ssize_t(found.size())});
+        return to_array<int64_t>(found, {py::ssize_t(found.size())});
       },
       py::arg("values").noconvert(), py::arg("index").noconvert(),
       "Flat indices [n] int64 of the blocks without values that the surface enters; arguments as marching_cubes.");
@@ -72,7 +62,9 @@ void bind_mesh(py::module_& m) {
           py::gil_scoped_release release;
           mesh = splitnerf::marching_cubes(grid, origin, spacing);
         }
-        return py::make_tuple(as_array(mesh.vertices, 3), as_array(mesh.triangles, 3));
+        const py::ssize_t n = mesh.vertices.size() / 3, m = mesh.triangles.size() / 3, corners = 3;
+        return py::make_tuple(to_array<float>(mesh.vertices, {n, corners}),
+                              to_array<int32_t>(mesh.triangles, {m, corners}));
       },
       py::arg("values").noconvert(), py::arg("index").noconvert(), py::arg("origin"), py::arg("spacing"),
       "The zero level set as (vertices [n, 3] float32, triangles [m, 3] int32), outward where values < 0 is inside.\n\n"

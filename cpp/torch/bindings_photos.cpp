@@ -1,7 +1,5 @@
 // Averages of photos on NumPy arrays: check, call without the GIL.
-#include "bindings_photos.h"
-
-#include <pybind11/numpy.h>
+#include "bindings.h"
 
 #include <cstdint>
 

@@ -1,7 +1,6 @@
 // Embree scenes and the path tracer on NumPy arrays: check, allocate, call without the GIL.
-#include "bindings_scene.h"
+#include "bindings.h"
 
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -274,27 +273,18 @@ void bind_scene(py::module_& m) {
       "factor or a texture lies outside its range.")
       .def(py::init<const py::list&>(), py::arg("materials"));
 
-  m.def("render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
-        py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-        py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
-        py::arg("materials") = py::none(), py::arg("material_ids") = py::none(), py::arg("uv") = py::none(),
-        py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
-        py::arg("clamp_indirect") = 0.f, py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
-        "Path-traces the scene under an equirectangular light; float32 arrays in, a dict of float32 arrays out.\n\n"
-        "albedo [n_vertices, 3], roughness [n_vertices], metallic [n_vertices]: in [0, 1], linear.\n"
-        "environment: [h, w, 3] linear radiance. camera_to_world: [3, 4], OpenGL axes; fx ... cy in pixels.\n"
-        "normals: [n_vertices, 3] shading normals, or None for flat shading.\n"
-        "clamp_indirect: largest channel of one indirect contribution, 0 for no limit (unbiased).\n"
-        "materials (Materials), material_ids [m] int32, uv [n_vertices, 2], tangents [n_vertices, 4]: see "
-        "splitnerf.data.asset;\n"
-        "multiplied with albedo, roughness and metallic.\n"
-        "pixel_filter: 'box' (1 pixel) or 'blackman-harris' (1.5 pixels). catcher_height: z of an invisible ground\n"
-        "plane that catches the shadow of the direct light, or None.\n"
-        "Returns radiance [h, w, 3] (linear, premultiplied), alpha [h, w], and of the first hit, averaged over the\n"
-        "sub-samples that hit: albedo, roughness, metallic, normal and smooth_normal (world space; with and without\n"
-        "normal texture), depth (along the ray); with a catcher shadow [h, w], the opacity of the black shadow\n"
-        "(alpha + shadow <= 1); and rays, the number of rays traced.\n"
-        "Equal seeds give equal images.");
+  m.def(
+      "render", &render, py::arg("scene"), py::arg("albedo"), py::arg("roughness"), py::arg("metallic"),
+      py::arg("environment"), py::arg("camera_to_world"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
+      py::arg("width"), py::arg("height"), py::kw_only(), py::arg("normals") = py::none(),
+      py::arg("materials") = py::none(), py::arg("material_ids") = py::none(), py::arg("uv") = py::none(),
+      py::arg("tangents") = py::none(), py::arg("spp") = 64, py::arg("max_bounces") = 4, py::arg("seed") = 0,
+      py::arg("clamp_indirect") = 0.f, py::arg("pixel_filter") = "box", py::arg("catcher_height") = py::none(),
+      "Path-traces the scene: see splitnerf.render.path_traced.AssetRenderer.render, which calls it; float32 arrays in "
+      "and out.\n\n"
+      "albedo [n_vertices, 3], roughness and metallic [n_vertices] in [0, 1], linear, are multiplied with what the\n"
+      "materials say. normals: [n_vertices, 3], or None for flat shading. Maps of the first hit are means over the\n"
+      "sub-samples that hit. The result holds rays, too, their number.");
 
   m.def(
       "pixel_filter_offsets", &pixel_filter_offsets, py::arg("u"), py::arg("pixel_filter") = "blackman-harris",

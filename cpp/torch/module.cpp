@@ -4,14 +4,10 @@
 
 #include <array>
 
-#include "bindings_light.h"
-#include "bindings_mesh.h"
-#include "bindings_photos.h"
-#include "bindings_scene.h"
+#include "bindings.h"
 #include "splitnerf/environment.h"
 #include "splitnerf/hash_grid.h"
 #include "splitnerf/kernels.h"
-#include "splitnerf/losses.h"
 #include "splitnerf/sampling.h"
 #include "splitnerf/split_sum.h"
 
