@@ -53,6 +53,7 @@ from splitnerf.run_folder import (
     discard_refinement,
     is_refined,
     move_assets,
+    refuse_no_run,
 )
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import Training
@@ -265,8 +266,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
 def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
     """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself. Raises InputError where
     there is no run, or its checkpoint cannot be read."""
-    if not run.is_dir():
-        raise InputError(f"{run}: no such run; train one with `splitnerf train DATA --out {run}`")
+    refuse_no_run(run)
     content = load_checkpoint(run / "checkpoint.pt")
     config = config_of(content)
     model = SceneModel(config)
@@ -322,6 +322,7 @@ def export_run(
     """
     if is_refined(run) and out.resolve() == run.resolve():
         raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
+    refuse_no_run(run)
     check_results(out, run, overwrite=overwrite)
     model, _, content = load_run(run)
     with locked(out):

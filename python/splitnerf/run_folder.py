@@ -7,7 +7,7 @@ from pathlib import Path
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import EXPOSURES
-from splitnerf.data.frames import refuse_data
+from splitnerf.data.frames import layout_of, refuse_data
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
@@ -35,6 +35,14 @@ def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
         )
     if overwrite and present_in(run) and not is_run(run):
         raise InputError(f"{run / present_in(run)[0]}: is of no run, and would be deleted; give another --out")
+
+
+def refuse_no_run(run: Path) -> None:
+    """Raises InputError where a path is no folder, or a data set's."""
+    if not run.is_dir():
+        raise InputError(f"{run}: no such run; train one with `splitnerf train DATA --out {run}`")
+    if layout_of(run) is not None:
+        raise InputError(f"{run}: is a data set, not a run; train one with `splitnerf train {run} --out RUN`")
 
 
 def check_results(out: Path, run: Path, *, overwrite: bool) -> None:

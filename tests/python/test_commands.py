@@ -1,6 +1,5 @@
 """The command line: help, names, completion, and commands of plugins."""
 
-import argparse
 import shlex
 import shutil
 import subprocess
@@ -10,14 +9,14 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 from splitnerf import plugins
-from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser
-from splitnerf.cli.common import SHELLS, examples_in
+from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser, main
+from splitnerf.cli.common import SHELLS, commands_of, examples_in
 from splitnerf.plugins import Plugin, installed
 from splitnerf.run_folder import is_finished
 from splitnerf_tools.plugin import PLUGIN
 from tiny_runs import train
 
-PARSERS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
+PARSERS = commands_of(build_parser())
 
 
 def script(shell: str, capsys) -> str:
@@ -149,3 +148,60 @@ def test_the_core_does_without_the_tools(found, data, tmp_path, capsys):
     assert train(data, tmp_path / "other", "--view") == BAD_INPUT and "--view" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         build_parser().parse_args(["doctor"])
+
+
+USAGE = {  # words, and what stands in the one line
+    "no such command": (("trian", "data"), "'trian'; did you mean train?"),
+    "nothing near": (("xyzzy",), "'xyzzy'; there are prepare, inspect, "),
+    "an option misspelled": (
+        ("train", "data", "--stepz=3"),
+        "'--stepz=3'; did you mean --steps? (see `splitnerf train --help`)",
+    ),
+    "an option cut short": (("train", "data", "--step", "3"), "'--step'; did you mean --steps?"),
+    "no such choice": (("train", "data", "--preset", "gpu"), "--preset: unknown 'gpu'; there are cpu, fast, paper"),
+    "no number": (("train", "data", "--max-minutes", "one"), "--max-minutes: invalid float value: 'one'"),
+    "something missing": (("relight", "run"), "--env, --out"),
+}
+
+
+@pytest.mark.parametrize("case", USAGE)
+def test_wrong_usage_is_one_line_that_says_what_was_meant(case, capsys):
+    words, said = USAGE[case]
+    with pytest.raises(SystemExit) as ended:
+        main(list(words))
+    out, err = capsys.readouterr()
+    assert ended.value.code == BAD_INPUT and out == "" and err.count("\n") == 1
+    assert err.startswith("splitnerf: ") and said in err
+
+
+def test_no_words_at_all_print_the_help(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["splitnerf"])
+    assert main() == DONE
+    assert "reconstruction:" in capsys.readouterr().out
+
+
+ELSEWHERE = {  # the folder that is given, and what stands in the one line
+    "photos": ("photos", "holds photos without cameras; `splitnerf prepare"),
+    "a part of data": ("data/train", "is a part of the data set"),
+    "data sets": ("", "holds data sets; give one, such as"),
+    "a run": ("run", "is a run; look at it by `splitnerf view"),
+    "nothing known": ("empty", "has neither transforms_"),
+}
+
+
+@pytest.mark.parametrize("case", ELSEWHERE)
+def test_data_that_are_none_are_named(case, data, tmp_path, capsys):
+    shutil.copytree(data, tmp_path / "data")
+    for name in ("photos/a.JPG", "run/checkpoint.pt", "empty/notes.txt"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
+    folder, said = ELSEWHERE[case]
+    assert main(["train", str(tmp_path / folder), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
+    assert said in line
+
+
+@pytest.mark.parametrize("words", [("export",), ("evaluate",), ("refine", "--data", "data")])
+def test_a_run_that_is_data_is_named(words, data, capsys):
+    assert main([words[0], str(data), *words[1:]]) == BAD_INPUT
+    assert "is a data set, not a run; train one with" in capsys.readouterr().err

@@ -12,7 +12,18 @@ from functools import partial
 
 import splitnerf
 from splitnerf.cli import evaluate, export, info, refine, relight, train
-from splitnerf.cli.common import BAD_INPUT, DONE, FAILED, INTERRUPTED, SHELLS, Help, PrintCompletion, ProgramHelp
+from splitnerf.cli.common import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    SHELLS,
+    Help,
+    Parser,
+    PrintCompletion,
+    ProgramHelp,
+    commands_of,
+)
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
@@ -22,8 +33,8 @@ from splitnerf.progress import ended_by_signals
 COMMANDS = {"reconstruction": (train, refine), "results": (export, relight, evaluate), "this installation": (info,)}
 
 
-def build_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def build_parser() -> Parser:
+    parser = Parser(
         prog="splitnerf",
         description="From posed images of one object to a mesh, PBR materials and the HDR environment.",
     )
@@ -53,7 +64,12 @@ def main(argv: list[str] | None = None) -> int:
     # for a whole time slice. A short spin costs nothing on an idle machine.
     os.environ.setdefault("GOMP_SPINCOUNT", "30000")
     with lasting_streams():
-        args = build_parser().parse_args(argv)
+        parser = build_parser()
+        if not (sys.argv[1:] if argv is None else argv):
+            parser.print_help()
+            return DONE
+        args, rest = parser.parse_known_args(argv)
+        commands_of(parser)[args.command].refuse_unknown(rest)
         with ended_by_signals():
             code, words = execute(args)
         if words:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
+
+from splitnerf.errors import plain
 
 if TYPE_CHECKING:
     from splitnerf.data.reading import Reading
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 SHELLS = ("bash", "zsh", "tcsh")
 TITLE = "examples:"
+FEW = 4  # choices, which are all named
 
 
 def examples(*lines: str, after: str = "") -> str:
@@ -25,6 +29,41 @@ def examples_in(epilog: str | None) -> list[str]:
     """The command lines in the end of a command's help."""
     _, _, lines = (epilog or "").partition(TITLE)
     return [line.strip() for line in lines.splitlines() if line.strip()]
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line and name what was meant; options are not abbreviated, as a later one may begin
+    with the same letters."""
+
+    def __init__(self, **options: object):
+        super().__init__(allow_abbrev=False, **options)
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"splitnerf: {plain(message)} (see `{self.prog} --help`)\n")
+
+    def refuse_unknown(self, words: list[str]) -> None:
+        """Ends the program where words are left over."""
+        if words:
+            self.error(f"unknown {words[0]!r}{meant(words[0].partition('=')[0], self._option_string_actions)}")
+
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        if action.choices is not None and value not in action.choices:
+            choices = list(map(str, action.choices))
+            near = meant(str(value), choices) if len(choices) > FEW else ""
+            hint = near or f"; there are {', '.join(choices)}"
+            raise argparse.ArgumentError(action, f"unknown {str(value)!r}{hint}")
+
+
+def commands_of(parser: argparse.ArgumentParser) -> dict[str, Parser]:
+    """A parser's commands by their names."""
+    found = (action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return next(found, {})
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """A question for the nearest known word; "" where none is near."""
+    near = get_close_matches(word, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 class Help(argparse.HelpFormatter):
@@ -67,11 +106,10 @@ class PrintCompletion(argparse.Action):
 
 def complete_files(parser: argparse.ArgumentParser, files: dict[str, str]) -> None:
     """Marks all arguments of a parser and of its commands that are paths, so that names of files complete them."""
+    for command in commands_of(parser).values():
+        complete_files(command, files)
     for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                complete_files(command, files)
-        elif action.type is Path:
+        if action.type is Path:
             action.complete = files
 
 

@@ -78,6 +78,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     check_usage(args)
     from splitnerf.evaluate.scoring import read_evaluation
+    from splitnerf.run_folder import refuse_no_run
 
     data = args.data or []
     evaluations = []
@@ -88,6 +89,8 @@ def run(args: argparse.Namespace) -> int:
         if data:
             scores = evaluate_target(target, data[min(i, len(data) - 1)], args)
         else:
+            if target.is_dir():
+                refuse_no_run(target)
             scores = read_evaluation(target)
         evaluations.append((scene_name(target), scores))
         if len(args.targets) > 1:

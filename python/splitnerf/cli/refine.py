@@ -38,13 +38,15 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import FitSettings
     from splitnerf.refinement.refine import refine_run
-    from splitnerf.run_folder import check_results
+    from splitnerf.run_folder import check_results, refuse_no_run
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
     sweeps = (UNLIMITED if args.minutes > 0 else FitSettings.sweeps) if args.sweeps is None else args.sweeps
     if sweeps < 1:
         raise InputError(f"--sweeps must be at least 1, got {sweeps}")
+    if not (args.run / "mesh.glb").is_file():
+        refuse_no_run(args.run)
     out = args.out or args.run / "refined"
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")

@@ -17,6 +17,7 @@ LAYOUTS = (stanford_orb, transforms, view_folders, neus, colmap)
 """The first that a folder has counts."""
 TEST_STRIDE = 8
 WORDS = {"train": r"(?<![a-z])train", "test": r"(?<![a-z])(test|eval)"}  # in the path of a split's image
+PHOTOS = (".jpg", ".jpeg", ".png", ".heic", ".tif", ".tiff", ".webp", ".dng", ".cr2", ".nef", ".arw")
 FAR = 1e3  # distances between the cameras; farther from the origin, float32 loses what pixels show
 
 
@@ -28,6 +29,8 @@ def read_frames(root: Path, split: str, reading: Reading = Reading()) -> tuple[l
     pose or no lens."""
     layout = layout_of(root)
     if layout is None:
+        if meant := what_is_in(root):
+            raise InputError(f"{root}: {meant}")
         raise InputError(
             f"{root}: has neither transforms_{split}.json nor transforms.json, nor view folders like train_000, nor "
             f"{neus.CAMERAS}, nor a COLMAP model in sparse/0; give the folder that holds one"
@@ -57,6 +60,23 @@ def has_test_split(root: Path, reading: Reading = Reading()) -> bool:
 def layout_of(root: Path) -> ModuleType | None:
     """The layout of a folder, or None."""
     return next((layout for layout in LAYOUTS if layout.present(root)), None)
+
+
+def what_is_in(folder: Path) -> str:
+    """What a folder without a layout holds instead, and what to do with it; "" where that is unknown."""
+    if not folder.is_dir():
+        return ""
+    if (folder / "checkpoint.pt").is_file():
+        return f"is a run; look at it by `splitnerf view {folder}`, or continue it by --resume with its data"
+    if layout_of(folder.resolve().parent) is not None:
+        return f"is a part of the data set {folder.resolve().parent}; give that"
+    inside = sorted(folder.iterdir())
+    for path in inside:
+        if path.is_dir() and layout_of(path) is not None:
+            return f"holds data sets; give one, such as {path}"
+    if any(path.suffix.lower() in PHOTOS for path in inside):
+        return f"holds photos without cameras; `splitnerf prepare {folder} --out DATA` finds these"
+    return ""
 
 
 def refuse_data(folder: Path) -> None:

@@ -31,7 +31,7 @@ class Document:
         2.0."""
         self.path = path
         if not path.is_file():
-            raise InputError(f"{path}: no such file; give a .glb or .gltf file")
+            raise InputError(f"{path}: no such file; give a .glb or .gltf file, or a run")
         data = path.read_bytes()
         text, self._binary = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
         try:
