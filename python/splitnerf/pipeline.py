@@ -54,6 +54,7 @@ from splitnerf.run_folder import (
     is_refined,
     move_assets,
     refuse_no_run,
+    write_data_of,
 )
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import Training
@@ -137,6 +138,7 @@ def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> N
     if dataset.origin.any():
         meaning = "add it to positions to get those of the data"
         write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
+    write_data_of(run, dataset)
     config.write(run / "config.toml")
 
 

@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 
 from splitnerf.config import Config
-from splitnerf.data.dataset import EXPOSURES
+from splitnerf.data.dataset import EXPOSURES, Dataset
 from splitnerf.data.frames import layout_of, refuse_data
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
@@ -15,10 +16,11 @@ from splitnerf.refinement.refine import RECORD, STATE, TRAINED
 from splitnerf.training.metrics import METRICS
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
+DATA = "data.json"  # where the photos of the run are
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
-RUN_FILES += (ORIGIN, EXPOSURES, *REFINEMENT_FILES)
+RUN_FILES += (ORIGIN, DATA, EXPOSURES, *REFINEMENT_FILES)
 EXPORTED = ("mesh.obj", "mesh.mtl", "mesh.usdz")  # by request, beside those of a run
 
 
@@ -58,6 +60,22 @@ def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
         raise InputError(f"{out / present[0]}: would be replaced; give another --out, or --overwrite")
 
 
+def write_data_of(run: Path, dataset: Dataset) -> None:
+    """Writes where the photos of a run are, and how much their edges were averaged down."""
+    write_json(run / DATA, {"data": str(dataset.root.resolve()), "downscale": dataset.downscale})
+
+
+def data_of(run: Path) -> tuple[Path, int] | None:
+    """The folder of a run's data and their downscale; None where it is not known, or gone."""
+    if not (run / DATA).is_file():
+        return None
+    content = read_json(run / DATA, "data")
+    root, downscale = content.get("data"), content.get("downscale")
+    if not isinstance(root, str) or type(downscale) is not int or downscale < 1:
+        raise InputError(f"{run / DATA}: is damaged; delete it, and give --data")
+    return (Path(root), downscale) if Path(root).is_dir() else None
+
+
 def present_in(run: Path) -> list[str]:
     """The files of a run that a folder holds."""
     return [name for name in RUN_FILES if (run / name).exists()]
@@ -84,7 +102,7 @@ def begin_or_resume(run: Path) -> tuple[bool, bool]:
     """Whether to resume the run of a folder, or to overwrite it: one that ended before its first checkpoint."""
     if (run / "checkpoint.pt").is_file():
         return True, False
-    return False, set(present_in(run)) <= {"config.toml", METRICS}
+    return False, set(present_in(run)) <= {"config.toml", METRICS, ORIGIN, DATA}
 
 
 def is_finished(run: Path) -> bool:

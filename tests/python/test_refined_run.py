@@ -28,6 +28,7 @@ from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.refinement.refine import OtherState, refine_folder
 from splitnerf.refinement.stage import Stage
+from splitnerf.run_folder import data_of
 from splitnerf_tools.report.sections import refinement_section
 from tiny_runs import train
 
@@ -292,6 +293,20 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
     (folder / "refinement.pt").write_bytes(state)
     write_glb(folder / "mesh.glb", asset)
     refused("another asset")
+
+
+def test_a_run_knows_its_data(run, data, tmp_path, capsys):
+    """Where they are and how they were averaged; what is gone or was never said is asked for."""
+    assert data_of(run) == (data.resolve(), 1)
+    again, out = shutil.copytree(run, tmp_path / "again"), tmp_path / "refined"
+    assert main(["refine", str(again), "--sweeps", "1", "--out", str(out)]) == DONE and (out / "mesh.glb").is_file()
+    for content in ('{"data": "%s", "downscale": 1}' % (tmp_path / "gone"), None):
+        (again / "data.json").unlink() if content is None else (again / "data.json").write_text(content)
+        assert main(["refine", str(again), "--sweeps", "1", "--out", str(out / "more")]) == BAD_INPUT
+        assert "does not say where its data are, or they are gone; give --data" in capsys.readouterr().err
+    (again / "data.json").write_text('{"data": ".", "downscale": 0}')
+    with pytest.raises(InputError, match="data.json: is damaged"):
+        data_of(again)
 
 
 def test_refine_starts_from_what_was_trained_and_can_be_interrupted(run, data, tmp_path, monkeypatch, capsys):

@@ -161,6 +161,8 @@ def print_summary(
     print_refinement(evaluation.get("refinement"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
+    print(f"look at it: splitnerf view {run}")
+    print(f"in another light: splitnerf relight {run} --env MAP.hdr --turntable 60 --gif --out {run}/relit")
 
 
 def print_refinement(summary: dict | None) -> None:

@@ -18,12 +18,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "normals) and the light of environment.exr to the photos through the path tracer's own model, interreflection "
         "included. Writes mesh.glb, environment.exr and .hdr, and refinement.json into RUN/refined. Ctrl-C "
         "keeps the state there; --resume continues.",
-        epilog=examples("splitnerf refine runs/data --data data --minutes 10"),
+        epilog=examples("splitnerf refine runs/data --minutes 10"),
     )
     add = parser.add_argument
     add("run", type=Path, metavar="RUN", help="a finished run, or a folder with both files")
-    add("--data", type=Path, required=True, metavar="DATA", help="the data that RUN was trained on")
-    add("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
+    add("--data", type=Path, metavar="DATA", help="the data that RUN was trained on (default: where they were)")
+    add("--downscale", type=int, metavar="N", help="average images down by N (default: as in training)")
     add_reading_options(parser, "as in training")
     add("--sweeps", type=int, metavar="N", help="most steps of the fit (default: 16 without --minutes)")
     add("--minutes", type=float, default=0.0, metavar="M", help="begin no step after M (default: no limit)")
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import FitSettings
     from splitnerf.refinement.refine import refine_run
-    from splitnerf.run_folder import check_results, refuse_no_run
+    from splitnerf.run_folder import check_results, data_of, refuse_no_run
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
@@ -51,12 +51,15 @@ def run(args: argparse.Namespace) -> int:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     check_results(out, args.run, overwrite=args.overwrite or args.resume)
+    data, downscale = data_of(args.run) or (None, 1)
+    if args.data is None and data is None:
+        raise InputError(f"{args.run}: does not say where its data are, or they are gone; give --data")
     settings = FitSettings(sweeps=sweeps, minutes=args.minutes, outline=not args.keep_shape)
     refined = refine_run(
         args.run,
-        args.data,
+        args.data or data,
         out,
-        downscale=args.downscale,
+        downscale=downscale if args.downscale is None else args.downscale,
         settings=settings,
         resume=args.resume,
         reading=reading_of(args, args.run),

@@ -185,6 +185,10 @@ class HashGrid(nn.Module):
         """The table's current 16-bit copy; None without `table_dtype`."""
         return None if self.copy is None else self.copy.of(self.table)
 
+    def extra_repr(self) -> str:
+        stored = "" if self.copy is None else f", table_dtype={self.copy.dtype}"
+        return f"{self.spec}, n_active={self.n_active}{stored}"
+
     def forward(self, positions: Tensor) -> Tensor:
         """Features [n, C] of positions [n, 3] in the unit cube; see :func:`hash_encode`."""
         return hash_encode(positions, self.table, self.spec, self.n_active, self.stored())

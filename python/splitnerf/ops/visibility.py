@@ -46,6 +46,10 @@ class MeshScene:
             np.ascontiguousarray(vertices, dtype=np.float32), np.ascontiguousarray(faces, dtype=np.int32)
         )
         self.handle: int = self._scene.handle
+        self._size = len(vertices), len(faces)
+
+    def __repr__(self) -> str:
+        return "MeshScene({} vertices, {} faces)".format(*self._size)
 
     def trace_closest(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The nearest hits of rays.

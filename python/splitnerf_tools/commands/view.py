@@ -20,7 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="look at an asset in the browser",
         description="Serves a page that shows RUN's mesh.glb, or a GLB file, in the light that the run recovered, and its "
         "maps. Other lights (.hdr, .exr) can be dropped onto the page. Ctrl-C ends it.",
-        epilog=examples("splitnerf view runs/data --data data", "splitnerf view runs/a runs/b --light studio.hdr"),
+        epilog=examples("splitnerf view runs/data", "splitnerf view runs/a runs/b --light studio.hdr"),
     )
     add = parser.add_argument
     add("source", type=Path, metavar="RUN|FILE.glb", help="a run's folder or a .glb")
@@ -28,7 +28,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "other", type=Path, nargs="?", metavar="OTHER", help="a second one, shown beside the first with the same camera"
     )
     add("--light", type=Path, metavar="MAP", help="equirectangular .exr or .hdr that is shown first")
-    add("--data", type=Path, metavar="DATA", help="the data that RUN was trained on: shows their cameras and photos")
+    add("--data", type=Path, metavar="DATA", help="the data whose cameras and photos are shown (default: RUN's)")
     add("--port", type=int, default=0, metavar="N", help="of the page's address (default: a free one)")
     add(
         "--host",
@@ -41,13 +41,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.run_folder import data_of
+
     from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
     from splitnerf_tools.view.server import ViewServer
 
     if not 0 <= args.port < 1 << 16:
         raise InputError(f"--port must lie between 0 and 65535, got {args.port}")
     shown = ViewedAssets([args.source] + ([args.other] if args.other else []), args.light)
-    photos = ViewedPhotos(args.data) if args.data else None
+    remembered = data_of(args.source) if args.source.is_dir() else None
+    data = args.data or (remembered and remembered[0])
+    photos = ViewedPhotos(data) if data else None
     with ViewServer(shown, photos, args.host, args.port) as server, suppress(KeyboardInterrupt):  # the way to end it
         if args.host != LOCAL:
             print(f"splitnerf: note: listens at {args.host}: whoever knows the address below can look", file=sys.stderr)
