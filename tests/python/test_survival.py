@@ -327,7 +327,9 @@ def test_resume_auto_begins_again_before_the_first_checkpoint(data, tmp_path, at
 
     at_step(2, fails)
     assert train(data, run, "--steps", "4") == FAILED
-    assert {path.name for path in run.iterdir()} <= {"config.toml", METRICS, "previews"} and (run / METRICS).exists()
+    assert {path.name for path in run.iterdir()} <= {"config.toml", "data.json", METRICS, "previews"} and (
+        run / METRICS
+    ).exists()
     monkeypatch.undo()
     assert train(data, run, "--steps", "4", "--resume", "auto") == DONE
     assert [line["step"] for line in lines_of(run)] == [1, 2, 3, 4]
