@@ -69,7 +69,7 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
 # ---- all terms at once, each with a weight of its own ----
 
 WEIGHTS = dict(colour_weight=0.11, eikonal_weight=0.13, mask_weight=0.17, light_weight=0.19, neutral_weight=0.23)
-WEIGHTS |= dict(smoothness_weight=0.29, entropy_weight=0.31, metal_weight=0.37, binary_metal_weight=0.41)
+WEIGHTS |= dict(smoothness_weight=0.29, entropy_weight=0.31, metal_weight=0.37)
 WEIGHTS |= dict(dark_metal_weight=0.43, occlusion_weight=0.47, light_prior_weight=0.53)
 FIXED = {"light": 2.0, "neutral": 3.0, "entropy": 5.0, "occlusion": 7.0}
 
@@ -112,7 +112,6 @@ def test_each_term_has_its_own_weight_and_its_own_value(rendered, every_term):
         "eikonal": (0.13, (ray.gradients.norm(dim=1) - 1).square().mean().item()),
         "mask": (0.17, -(mask * opacity.log() + (1 - mask) * (1 - opacity).log()).mean().item()),
         "metal": (0.37, (w @ m.square()).item()),
-        "binary_metal": (0.41, (w @ (m * (1 - m))).item()),
         "dark_metal": (0.43, (w @ (m * (1 - f0 / 0.4).clamp(min=0))).item()),
         "light": (0.19, 2.0),
         "neutral": (0.23, 3.0),
@@ -127,7 +126,7 @@ def test_each_term_has_its_own_weight_and_its_own_value(rendered, every_term):
 
 def test_terms_come_when_they_are_due(every_term):
     """Priors from the half of the run; what has no weight is not computed."""
-    assert {"entropy", "binary_metal"}.isdisjoint(every_term(progress=0.49)[0])
+    assert "entropy" not in every_term(progress=0.49)[0]
     assert not every_term(**dict.fromkeys(WEIGHTS, 0.0))[0].keys() - {"colour", "eikonal", "occlusion"}
 
 

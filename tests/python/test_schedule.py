@@ -201,7 +201,7 @@ def recorded(monkeypatch, name: str, note: Callable, module=trainer) -> list:
 def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     """Levels, anneal, rates, and the terms that begin late or stand for several steps, as a run of 41 steps has them."""
     n = 41
-    begun_late = {"entropy_weight": 0.01, "binary_metal_weight": 0.01, "priors_from": 0.5, "mesh_every": 0.25}
+    begun_late = {"entropy_weight": 0.01, "priors_from": 0.5, "mesh_every": 0.25}
     of_light = {"neutral_weight": 0.03, "light_prior_weight": 0.002, "light_step_every": 4}
     levels = {"n_levels": 8, "start_levels": 2, "levels_open_by": 0.6, "cos_anneal_by": 0.5}
     config = tiny(steps=n, warmup_steps=8, final_learning_rate=0.1, **levels, **begun_late, **of_light)
@@ -222,8 +222,7 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     w = 8 / n
     expected = [min(1.0, (step + 1) / 8) * 0.1 ** max(0.0, (step / n - w) / (1 - w)) for step in range(n)]
     assert all(group == pytest.approx([rate] * len(group)) for group, rate in zip(rates, expected, strict=True))
-    for prior in ("entropy", "binary_metal"):
-        assert [prior in step for step in terms] == [step / n >= 0.5 for step in range(n)]
+    assert ["entropy" in step for step in terms] == [step / n >= 0.5 for step in range(n)]
     for prior, weight in (("neutral", 0.03), ("light_prior", 0.002)):
         assert [step for step in range(n) if prior in terms[step]] == [*range(3, 40, 4), 40]
         assert sum(step.get(prior, 0.0) for step in terms) == pytest.approx(weight * n)

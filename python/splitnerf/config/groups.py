@@ -203,7 +203,6 @@ class LossesSettings:
     occlusion_weight: float = setting(0.1, "weight of the traced occlusion factors (of the MLP)")
     eikonal_weight: float = setting(0.3, "weight of |gradient of the distance| = 1")
     metal_weight: float = setting(0.0001, "weight of metallic squared")
-    binary_metal_weight: float = setting(0.003, "weight of metallic between 0 and 1, from half of the run")
     dark_metal_weight: float = setting(0.002, "weight of metals darker than real ones")
     mask_weight: float = setting(1.0, "weight of the masks")
     edge_pixels: int = setting(

@@ -37,7 +37,6 @@ PAPER = dict(
         light_prior_weight=0.0,
         seen_weight=0.0,
         entropy_weight=0.0,
-        binary_metal_weight=0.0,
         dark_metal_weight=0.0,
         smoothness_weight=0.0,
     ),

@@ -127,11 +127,7 @@ def loss_terms(
         gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
     )
     terms.add(
-        {
-            "metal": w.metal_weight or None,
-            "binary_metal": (has_priors and w.binary_metal_weight) or None,
-            "dark_metal": w.dark_metal_weight or None,
-        },
+        {"metal": w.metal_weight or None, "dark_metal": w.dark_metal_weight or None},
         material_losses(ray.points.albedo.detach(), ray.points.metallic, ray.shares),
     )
     if has_priors and w.entropy_weight:
@@ -193,7 +189,7 @@ def light_directions(config: Config, n: int, queries: Tensor, generator: torch.G
 
 
 def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor) -> Tensor:
-    """Three penalties on metallic m: for metals, for values between 0 and 1, and for dark metals.
+    """Two penalties on metallic m: for metals, and for dark metals.
 
     Args:
         albedo: [n, 3] linear albedo in [0, 1].
@@ -201,15 +197,15 @@ def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor) -> Tensor:
         shares: [n] weights of the points.
 
     Returns:
-        [3]: metal, binary_metal and dark_metal, weighted means of m^2, of m (1 - m) and of m (1 - F0 / 0.4)+, where
-        F0 is the brightest channel of the albedo; 0 without points.
+        [2]: metal and dark_metal, weighted means of m^2 and of m (1 - F0 / 0.4)+, where F0 is the brightest channel of
+        the albedo; 0 without points.
 
     Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = 0.04
     look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
     """
     m = metallic[:, 0]
     darkness = (1 - albedo.amax(1) / 0.4).clamp(min=0)
-    penalties = torch.stack([m * m, m * (1 - m), m * darkness])
+    penalties = torch.stack([m * m, m * darkness])
     return penalties @ (shares / shares.sum().clamp(min=1e-8))
 
 

@@ -49,12 +49,7 @@ SWITCHES: dict[str, dict[str, object]] = {
     "no smoothness of normals": {"losses.smoothness_weight": 0.0},
     "no material entropy": {"losses.entropy_weight": 0.0},
     "dark metals allowed": {"losses.dark_metal_weight": 0.0},
-    "metals by halves": {"losses.binary_metal_weight": 0.0},
-    "no metal loss at all": {
-        "losses.metal_weight": 0.0,
-        "losses.binary_metal_weight": 0.0,
-        "losses.dark_metal_weight": 0.0,
-    },
+    "no metal loss at all": {"losses.metal_weight": 0.0, "losses.dark_metal_weight": 0.0},
 }
 # The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {
