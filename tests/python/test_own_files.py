@@ -51,6 +51,10 @@ def test_a_folder_is_emptied_only_by_its_maker(mine, tmp_path):
     assert (mine / "result").exists()
     own_folder(mine, "b")
     assert not (mine / "result").exists() and is_own(mine)
+    own_folder(mine)
+    (mine / "result").touch()
+    own_folder(mine)  # without a purpose there is none to keep it for
+    assert not (mine / "result").exists()
     (tmp_path / "link").symlink_to(mine)
     with pytest.raises(InputError, match="link: holds other files"):
         own_folder(tmp_path / "link")
