@@ -18,6 +18,7 @@ from splitnerf.training.metrics import METRICS
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 DATA = "data.json"  # where the photos of the run are
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
+REFINED = "refined"  # the folder in a run of what `refine` made of it
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
 RUN_FILES += (ORIGIN, DATA, EXPOSURES, *REFINEMENT_FILES)
@@ -48,10 +49,10 @@ def refuse_no_run(run: Path) -> None:
 
 
 def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
-    """Checks that results of a run can be written into a folder. Raises InputError where they would replace a data set,
-    what belongs to another run or, unless ``overwrite``, other files."""
+    """Checks that results of a run can be written into a folder; its own folders hold nothing else. Raises InputError
+    where they would replace a data set, what belongs to another run or, unless ``overwrite``, other files."""
     refuse_data(out)
-    if out.resolve().is_relative_to(run.resolve()):
+    if out.resolve() in [(run / name).resolve() for name in (".", TRAINED, REFINED)]:
         return
     if (out / "checkpoint.pt").exists():
         raise InputError(f"{out}: holds another run, whose results would be replaced; give another --out")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -33,6 +35,23 @@ def test_of_few_photos_an_eighth_of_the_blocks_is():
     blocks = held.reshape(3, 8, 8, 8, 8).mean(axis=(2, 4))
     assert np.isin(blocks, (0, 1)).all() and blocks.sum(axis=(1, 2)).tolist() == [64 / HELD_OUT] * 3
     assert not (held[:-1] & held[1:]).any()
+
+
+@pytest.mark.parametrize(("size", "n_held"), [(1, 0), (2, 0), (5, 3)])
+def test_photos_of_a_few_pixels_are_divided_or_judge_themselves(size, n_held):
+    """One block holds all of them; none may leave the fit or its judge without pixels."""
+    held = held_out(pixels_of_views(1, size))
+    assert held.sum() == n_held and not held.all()
+
+
+def test_a_fit_of_a_few_pixels_has_a_judge(painted):
+    asset, data = painted
+    few = data.images[:1].copy()
+    seen = np.argwhere(few[0, ..., 3] > 0.999)
+    few[..., 3] = 0.0
+    few[(0, *seen[len(seen) // 2], 3)] = 1.0
+    fit = Refinement(replace(data.select([0]), images=few), asset, sky(), SETTINGS)
+    assert len(fit.pixels) == 1 and np.isfinite(fit.held_errors()).all() and np.isfinite(fit.gather(fit.surface()))
 
 
 def test_held_out_pixels_are_not_fitted_and_their_error_is_one_number(painted):

@@ -104,6 +104,8 @@ def test_results_do_not_replace_others(done, mine, tmp_path, capsys, name, words
     before = contents(other) | contents(mine)
     for more in ((), ("--overwrite",)):
         refused(capsys, "other: holds another run", name, done, *words, "--out", other, *more)
+    shutil.copytree(other, done / "other")  # also where the folder that is exported lies around it
+    refused(capsys, "other: holds another run", name, done, *words, "--out", done / "other")
     refused(capsys, "mine/mesh.obj: would be replaced", name, done, *words, "--out", mine)
     assert contents(other) | contents(mine) == before
 

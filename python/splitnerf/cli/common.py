@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, NoReturn
 
 from splitnerf.errors import plain
@@ -161,8 +162,9 @@ def print_summary(
     print_refinement(evaluation.get("refinement"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
-    print(f"look at it: splitnerf view {run}")
-    print(f"in another light: splitnerf relight {run} --env MAP.hdr --turntable 60 --gif --out {run}/relit")
+    name, relit = (quote(str(path)) for path in (run, run / "relit"))
+    print(f"look at it: splitnerf view {name}")
+    print(f"in another light: splitnerf relight {name} --env MAP.hdr --turntable 60 --gif --out {relit}")
 
 
 def print_refinement(summary: dict | None) -> None:
@@ -177,7 +179,7 @@ def print_refinement(summary: dict | None) -> None:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
     print(f"refinement, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
     if summary["delivered"] == 0:
-        print("no step helped the photos held out: the asset has the textures and the light of the training")
+        print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
 
 
 def print_scores(evaluation: dict) -> None:

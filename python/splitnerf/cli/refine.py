@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import FitSettings
     from splitnerf.refinement.refine import refine_run
-    from splitnerf.run_folder import check_results, data_of, refuse_no_run
+    from splitnerf.run_folder import REFINED, check_results, data_of, refuse_no_run
 
     if not args.minutes >= 0:
         raise InputError(f"--minutes must not be negative, got {args.minutes}")
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--sweeps must be at least 1, got {sweeps}")
     if not (args.run / "mesh.glb").is_file():
         refuse_no_run(args.run)
-    out = args.out or args.run / "refined"
+    out = args.out or args.run / REFINED
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
     check_results(out, args.run, overwrite=args.overwrite or args.resume)

@@ -160,9 +160,9 @@ class Refinement:
         seen = dataset.surroundings if self.turns is None else None
         self.light_equations = LightEquations(self.light, surroundings=seen)
         held = held_out(self.pixels)
-        self.fitted, self.held = (
-            Draws(np.flatnonzero(chosen), self.pixels.view, dataset.light_turns) for chosen in (~held, held)
-        )
+        self.fitted = Draws(np.flatnonzero(~held), self.pixels.view, dataset.light_turns)
+        # fewer than eight pixels judge themselves
+        self.held = Draws(np.flatnonzero(held), self.pixels.view, dataset.light_turns) if held.any() else self.fitted
         self.random = np.random.default_rng(s.seed)
         self.unknowns = to_unknowns(self.texels.start)
         like = torch.zeros(N_UNKNOWNS)

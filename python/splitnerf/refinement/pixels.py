@@ -127,12 +127,13 @@ def covered_pixels(dataset: Dataset) -> Pixels:
 
 def held_out(pixels: Pixels) -> np.ndarray:
     """[n] bool, the pixels by which a fit is judged and not made: those of every eighth photo or, of fewer than 16 photos,
-    of an eighth of the photos' blocks."""
+    of an eighth of the photos' blocks; where these hold all pixels or none, every eighth pixel."""
     views = np.unique(pixels.view)
     if len(views) >= 2 * HELD_OUT:
         return np.isin(pixels.view, views[HELD_OUT // 2 :: HELD_OUT])
     column, row = np.floor(pixels.centre / BLOCK).astype(np.int64).T
-    return (column + 3 * row + 5 * pixels.view) % HELD_OUT == 0
+    held = (column + 3 * row + 5 * pixels.view) % HELD_OUT == 0
+    return held if held.any() and not held.all() else np.arange(len(pixels)) % HELD_OUT == HELD_OUT - 1
 
 
 class PixelFilter:
