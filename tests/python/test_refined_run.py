@@ -406,9 +406,13 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     assert after > before and summary["steps"] == 4
     print_refinement(summary)
     held = "of photos held out {:.2f} -> {:.2f} dB".format(*summary["held_out_psnr"])
-    assert f"colours {before:.2f} -> {after:.2f} dB, {held}, coverage at the outline" in capsys.readouterr().out
-    print_refinement(summary | {"delivered": 0})
-    assert "no step helped the photos held out" in capsys.readouterr().out
+    assert f"colours {before:.2f} -> {after:.2f} dB, {held}, coverage at the outline" in (
+        said := capsys.readouterr().out
+    )
+    assert "a lamp that training had smeared" not in said
+    print_refinement(summary | {"delivered": 0, "lamp": True})
+    said = capsys.readouterr().out
+    assert "no step helped the photos held out" in said and "a lamp that training had smeared" in said
     print_refinement(None)
     assert capsys.readouterr().out == ""
 
@@ -443,6 +447,7 @@ def test_the_reports_numbers_are_those_of_its_pictures():
             "photos_psnr": [20.0, 30.0],
             "outline_error": None,
             "saturated": 0.125,
+            "lamp": True,
             "held_out_psnr": [21.0, 29.0],
             "delivered": 2,
         },

@@ -61,10 +61,9 @@ def walk(data, tmp_path_factory):
         patch.setattr(live_module, "ASSET_EVERY", 1.0)
         server = stack.enter_context(serving(ViewServer(live.shown, live=live)))
         training = Training(load_dataset(data), tiny(steps=100_000), run, torch.device("cpu"), together([live, slowly]))
-        done = []
 
         def deliver():
-            done.append(training.complete())
+            training.complete()
             live(Event("export"))
             triangle().write(run / "mesh.glb")
             write_image(run / "environment.exr", np.ones((4, 8, 3), np.float32))
@@ -110,7 +109,7 @@ def walk(data, tmp_path_factory):
             ],
         )
         thread.join()
-    return told["texts"], told["console"], versions, done[0], run
+    return told["texts"], told["console"], versions, training, run
 
 
 def test_the_page_of_a_run(walk):

@@ -238,6 +238,7 @@ def refinement_summary(run: Path) -> dict:
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
+        "lamp": record["lamp"] is not None,
         "saturated": record["saturated"],
     }
 

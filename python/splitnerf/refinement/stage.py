@@ -38,7 +38,7 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: The report of each sweep.
-        held: The error of held-out pixels before the first sweep, and with what is delivered.
+        held: The error of held-out pixels before the lamp and the first sweep, and with what is delivered.
         delivered: The number of the sweep that is delivered; 0 for the start.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
@@ -148,11 +148,13 @@ class Stage:
             self.held_start = float(state["held_start"])
             self.best, self.last = (self._checked(state[name]) for name in ("best", "last"))
             return
+        start = self.fit.held_errors()
+        self.held_start = float(start.mean())
         if settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
             show(self.progress, "refinement, looking for a lamp")
             self.lamp = self.fit.make_lamp_compact()
-        start = self.fit.held_errors()
-        self.held_start = float(start.mean())
+        if self.lamp is not None:  # photos do not tell a compact lamp from a smeared one: steps are judged with it
+            start = self.fit.held_errors()
         self.best = self.last = self._candidate(0, BIASED * start)
 
     def _candidate(self, number: int, held: np.ndarray) -> Candidate:
@@ -242,7 +244,7 @@ class Stage:
         fit, chosen = self.fit, self.best if self.last.is_worse(self.best) else self.last
         asset = fit.texels.asset_with(fit.texels.maps(to_values(chosen.unknowns)))
         light = radiance_of(chosen.light).numpy()
-        held = (self.held_start, float(np.mean(chosen.held)) if chosen.number else self.held_start)
+        held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else BIASED))
         saturated = float(fit.pixels.saturated.mean())
         return Refined(asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level)
 
