@@ -273,12 +273,12 @@ def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, l
     return weight @ light / weight.sum(1, keepdim=True)
 
 
-def sparse_product(
-    offsets, columns, weights, transposed_offsets, transposed_columns, transposed_weights, values
-) -> Tensor:
-    """The product of a sparse matrix, given by rows and by columns, with a dense one; torch uses the rows."""
-    shape = (len(offsets) - 1, len(transposed_offsets) - 1)
-    return torch.sparse_csr_tensor(offsets, columns.long(), weights, shape) @ values
+def sparse_product(offsets, columns, weights, places, images, *transposed_and_values) -> Tensor:
+    """The product of a sparse matrix, given by rows, with a dense one: an image at a time, by torch."""
+    *_, values = transposed_and_values
+    half = torch.sparse_csr_tensor(offsets, columns.long(), weights, (len(places), len(values)))
+    whole = [half @ values[image.long()] for image in images.T]
+    return torch.cat(whole)[places.T.flatten().argsort()]
 
 
 def octahedral_texels(w: Tensor, n: int) -> tuple[Tensor, Tensor]:

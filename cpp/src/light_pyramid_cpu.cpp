@@ -24,11 +24,14 @@ template void run<float>(int64_t, const LightLookupBody<float>&);
 template void run<double>(int64_t, const LightLookupBody<double>&);
 
 template <class T> void run(int64_t n, const SparseProductBody<T>& b) {
-  constexpr int64_t kRowGrain = 256;
-  std::vector<T> padded(4 * b.matrix.n_columns);
-  for (int64_t i = 0; i < b.matrix.n_columns; ++i) std::copy_n(b.values + 3 * i, 3, &padded[4 * i]);
+  constexpr int64_t kRowGrain = 64, kColumnGrain = 1 << 14;
+  const int64_t n_padded = b.matrix.n_columns * b.matrix.n_images;
+  std::vector<T> padded(4 * n_padded);
+  parallel_for(n_padded, kColumnGrain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) std::copy_n(b.values + 3 * int64_t(b.matrix.images[i]), 3, &padded[4 * i]);
+  });
   std::atomic<bool> in_range{true};
-  parallel_for(n, kRowGrain, [&](int64_t begin, int64_t end) {
+  parallel_for(n / b.matrix.n_images, kRowGrain, [&](int64_t begin, int64_t end) {
     if (!kernels<T>().sparse_product(b.matrix, padded.data(), begin, end, b.products)) in_range = false;
   });
   if (!in_range)

@@ -201,11 +201,12 @@ SparseMatrix light_filter(int n, int m, double roughness) {
   SparseMatrix matrix;
   for (int side = n; side >= kCoarsestAverage; side /= 2) matrix.n_columns += int64_t(side) * side;
   const LobeRow lobe(n, roughness);
-  std::vector<std::vector<Entry>> rows(int64_t(m) * m);
-  parallel_for(m, 1, [&](int64_t begin, int64_t end) {
+  const int half = m / 2;
+  std::vector<std::vector<Entry>> rows(int64_t(half) * half);
+  parallel_for(half, 1, [&](int64_t begin, int64_t end) {
     Row row(matrix.n_columns);
-    for (int64_t r = begin * m; r < end * m; ++r) {
-      lobe.fill(direction_of(octahedral_texel_centre<double>(m, int(r % m), int(r / m))), row);
+    for (int64_t r = begin * half; r < end * half; ++r) {
+      lobe.fill(direction_of(octahedral_texel_centre<double>(m, int(r % half), int(r / half))), row);
       rows[r] = row.take_normalised();
     }
   });

@@ -50,13 +50,15 @@ void bind_light(py::module_& m) {
       "light_filter",
       [](int n, int resolution, double roughness) {
         check_side("light_filter", n);
-        if (resolution < 1 || resolution > 4096)
-          throw py::value_error("light_filter: resolution must be in [1, 4096], got " + std::to_string(resolution));
+        if (resolution < 2 || resolution > 4096 || resolution % 2 != 0)
+          throw py::value_error("light_filter: resolution must be even, in [2, 4096], got " +
+                                std::to_string(resolution));
         if (!(roughness >= 0 && roughness <= 1)) throw py::value_error("light_filter: roughness must be in [0, 1]");
         return to_tuple(splitnerf::light_filter(n, resolution, roughness));
       },
       py::arg("n"), py::arg("resolution"), py::arg("roughness"),
-      "Rows of light_averages(n) filtered at resolution^2 texels: (offsets, columns, weights, n_columns).");
+      "Rows of light_averages(n) filtered at a quarter of resolution^2 texels: (offsets, columns, weights, "
+      "n_columns).");
   m.def(
       "sh_projection",
       [](int n, bool cells) {

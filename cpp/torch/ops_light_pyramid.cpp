@@ -14,24 +14,42 @@ void check_rows(const char* op, const Tensor& offsets, int64_t n_entries) {
   require(ascend, op, "offsets must ascend within [0, " + std::to_string(n_entries) + "]");
 }
 
-Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor transposed_offsets,
-                      Tensor transposed_columns, Tensor transposed_weights, Tensor values) {
+Tensor sparse_product(Tensor offsets, Tensor columns, Tensor weights, Tensor places, Tensor images,
+                      Tensor transposed_offsets, Tensor transposed_columns, Tensor transposed_weights,
+                      Tensor transposed_places, Tensor transposed_images, Tensor values) {
   const char* op = "sparse_product";
   const Kind type = real_kind(op, "values", values);
   const Tensor o = checked(op, "offsets", offsets, {kAny}, type.with(ScalarType::Long));
   const Tensor c = checked(op, "columns", columns, {kAny}, type.with(ScalarType::Int));
   const Tensor w = checked(op, "weights", weights, {c.size(0)}, type);
   const Tensor x = checked(op, "values", values, {kAny, 3}, type);
-  checked(op, "transposed_offsets", transposed_offsets, {x.size(0) + 1}, type.with(ScalarType::Long));
+  require(o.size(0) > 0, op, "offsets must hold at least one number");
+  const Tensor p = checked(op, "places", places, {o.size(0) - 1, kAny}, type.with(ScalarType::Int));
+  const int64_t n_images = p.size(1), n_products = (o.size(0) - 1) * n_images;
+  require(n_images == 1 || n_images == kMirrorImages, op,
+          "places must have 1 or " + std::to_string(kMirrorImages) + " columns");
+  const Tensor m = checked(op, "images", images, {x.size(0), n_images}, type.with(ScalarType::Int));
+  checked(op, "transposed_offsets", transposed_offsets, {x.size(0) / n_images + 1}, type.with(ScalarType::Long));
   checked(op, "transposed_columns", transposed_columns, {c.size(0)}, type.with(ScalarType::Int));
   checked(op, "transposed_weights", transposed_weights, {c.size(0)}, type);
-  require(o.size(0) > 0, op, "offsets must hold at least one number");
-  if (type.on_cpu()) check_rows(op, o, c.size(0));  // to look at a GPU's numbers would mean waiting for it
-  Tensor products = empty_like_type(x, {o.size(0) - 1, 3}, type);
+  checked(op, "transposed_places", transposed_places, {x.size(0) / n_images, n_images}, type.with(ScalarType::Int));
+  checked(op, "transposed_images", transposed_images, {n_products, n_images}, type.with(ScalarType::Int));
+  if (type.on_cpu()) {  // to look at a GPU's numbers would mean waiting for it
+    check_rows(op, o, c.size(0));
+    check_indices(op, "places", p, n_products);
+    check_indices(op, "images", m, x.size(0));
+  }
+  Tensor products = empty_like_type(x, {n_products, 3}, type);
   on_device(type, [&](auto zero, const auto& device) {
     using T = decltype(zero);
-    const SparseRows<T> matrix{in<int64_t>(o), in<int32_t>(c), in<T>(w), x.size(0)};
-    device.run(op, o.size(0) - 1, SparseProductBody<T>{matrix, in<T>(x), out<T>(products)});
+    const SparseRows<T> matrix{in<int64_t>(o),
+                               in<int32_t>(c),
+                               in<T>(w),
+                               in<int32_t>(p),
+                               in<int32_t>(m),
+                               x.size(0),
+                               static_cast<int>(n_images)};
+    device.run(op, n_products, SparseProductBody<T>{matrix, in<T>(x), out<T>(products)});
   });
   return products;
 }
@@ -119,7 +137,8 @@ std::tuple<Tensor, Tensor, Tensor, Tensor> light_lookup_backward(Tensor directio
 
 SPLITNERF_OPERATORS(op) {
   op(SPLITNERF_OP(sparse_product),
-     "offsets columns weights transposed_offsets transposed_columns transposed_weights values");
+     "offsets columns weights places images transposed_offsets transposed_columns transposed_weights transposed_places "
+     "transposed_images values");
   op(SPLITNERF_OP(light_lookup), "directions roughness levels sh resolutions nodes zonal");
   op(SPLITNERF_OP(light_lookup_backward), "directions roughness levels sh resolutions nodes zonal grad_radiance");
 }

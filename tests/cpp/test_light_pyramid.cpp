@@ -80,8 +80,9 @@ TEST(LightLookup, InstructionSetsAgree) {
 }
 
 // Rows of no entry to 25, whose columns may repeat, against sums one entry after the other.
-template <class T> void expect_products(T tolerance) {
+template <class T> void expect_products(int n_images, T tolerance) {
   constexpr int64_t kColumns = 30;
+  const int padded_columns = 4 * n_images;
   Random random(5);
   std::vector<int64_t> offsets{0};
   std::vector<int32_t> columns;
@@ -89,24 +90,30 @@ template <class T> void expect_products(T tolerance) {
     for (int i = 0; i < length; ++i) columns.push_back(random.below(kColumns));
     offsets.push_back(int64_t(columns.size()));
   }
-  std::vector<T> weights(columns.size()), padded(4 * kColumns);
+  std::vector<T> weights(columns.size()), padded(padded_columns * kColumns);
+  std::vector<int32_t> places(26 * n_images);
+  for (size_t i = 0; i < places.size(); ++i) places[i] = int32_t(places.size() - 1 - i);
   for (T& w : weights) w = T(random.uniform(-1, 1));
   for (T& x : padded) x = T(random.uniform());
-  const SparseRows<T> matrix{offsets.data(), columns.data(), weights.data(), kColumns};
+  const SparseRows<T> matrix{offsets.data(), columns.data(), weights.data(), places.data(),
+                             nullptr,        kColumns,       n_images};
   for (const Kernels<T>& set : usable_kernels<T>()) {
-    std::vector<T> products(3 * 26, T(7));
+    std::vector<T> products(3 * places.size(), T(7));
     ASSERT_TRUE(set.sparse_product(matrix, padded.data(), 1, 26, products.data())) << set.name;
-    ASSERT_EQ(products[2], T(7)) << "row 0 was not asked for";
+    ASSERT_EQ(products[3 * places[0]], T(7)) << "row 0 was not asked for";
     for (int64_t row = 1; row < 26; ++row)
-      for (int c = 0; c < 3; ++c) {
-        T sum = 0;
-        for (int64_t k = offsets[row]; k < offsets[row + 1]; ++k) sum += weights[k] * padded[4 * columns[k] + c];
-        ASSERT_NEAR(products[3 * row + c], sum, tolerance) << set.name << ", row " << row;
-      }
+      for (int m = 0; m < n_images; ++m)
+        for (int c = 0; c < 3; ++c) {
+          T sum = 0;
+          for (int64_t k = offsets[row]; k < offsets[row + 1]; ++k)
+            sum += weights[k] * padded[padded_columns * columns[k] + 4 * m + c];
+          ASSERT_NEAR(products[3 * places[row * n_images + m] + c], sum, tolerance) << set.name << ", row " << row;
+        }
     for (const int32_t wrong : {int32_t(kColumns), -1}) {
       std::vector<int32_t> changed = columns;
       changed.back() = wrong;
-      const SparseRows<T> bad{offsets.data(), changed.data(), weights.data(), kColumns};
+      SparseRows<T> bad = matrix;
+      bad.columns = changed.data();
       EXPECT_FALSE(set.sparse_product(bad, padded.data(), 0, 26, products.data())) << set.name;
       EXPECT_TRUE(set.sparse_product(bad, padded.data(), 0, 25, products.data())) << set.name;
     }
@@ -114,8 +121,10 @@ template <class T> void expect_products(T tolerance) {
 }
 
 TEST(SparseProduct, InstructionSetsAgree) {
-  expect_products<double>(1e-14);
-  expect_products<float>(1e-5f);
+  for (const int n_images : {1, kMirrorImages}) {
+    expect_products<double>(n_images, 1e-14);
+    expect_products<float>(n_images, 1e-5f);
+  }
 }
 
 }  // namespace

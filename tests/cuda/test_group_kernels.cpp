@@ -366,11 +366,17 @@ TEST(GroupKernels, SparseProduct) {
     offsets.push_back(int64_t(columns.size()));
   }
   const auto weights = random.uniforms(columns.size(), -1), values = random.uniforms(3 * n_columns);
-  const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data(), n_columns};
-  std::vector<double> one(3 * n_rows), lanes(3 * n_rows);
-  cpu::run(n_rows, SparseProductBody<double>{matrix, values.data(), one.data()});
-  on_gpu(n_rows, SparseProductBody<double>{matrix, values.data(), lanes.data()});
-  expect_near(lanes, one, 1e-14);
+  for (const int n_images : {1, kMirrorImages}) {
+    std::vector<int32_t> places(n_rows * n_images), images(n_columns * n_images);
+    for (size_t i = 0; i < places.size(); ++i) places[i] = int32_t(places.size() - 1 - i);
+    for (int32_t& column : images) column = random.below(n_columns);
+    const SparseRows<double> matrix{offsets.data(), columns.data(), weights.data(), places.data(),
+                                    images.data(),  n_columns,      n_images};
+    std::vector<double> one(3 * places.size()), lanes(3 * places.size());
+    cpu::run(places.size(), SparseProductBody<double>{matrix, values.data(), one.data()});
+    on_gpu(places.size(), SparseProductBody<double>{matrix, values.data(), lanes.data()});
+    expect_near(lanes, one, 1e-14);
+  }
 }
 
 }  // namespace

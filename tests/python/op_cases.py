@@ -13,7 +13,7 @@ from op_checks import as_tuple, generator, lib, rand, unit
 from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
 from splitnerf.fields.surface import SdfField
-from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_averages, zonal_factors
+from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_filters, zonal_factors
 from torch.utils._pytree import tree_map
 
 # ---- the hash grid ----
@@ -241,8 +241,8 @@ def ones_like_outputs(op: str, inputs: tuple) -> tuple:
 
 
 def sparse_inputs(dtype) -> tuple:
-    matrix = (x.to(dtype) if x.is_floating_point() else x for x in light_averages(8))
-    return *matrix, torch.rand(64, 3, generator=generator(), dtype=torch.float64).to(dtype)
+    matrix = light_filters(8, [(8, 0.3)]).to(dtype)
+    return *matrix.rows, *matrix.transposed, torch.rand(64, 3, generator=generator(), dtype=torch.float64).to(dtype)
 
 
 def interpolation(dtype) -> tuple:

@@ -9,6 +9,7 @@ from op_checks import check_error, generator, lib, unit
 from splitnerf import _core
 from splitnerf.ops import (
     SparseMap,
+    SparseRows,
     light_averages,
     light_filters,
     light_lookup,
@@ -20,21 +21,33 @@ from splitnerf.ops import (
 
 
 def as_double(matrix: SparseMap) -> SparseMap:
-    return SparseMap(*(x.double() if x.is_floating_point() else x for x in matrix))
+    return matrix.to(torch.float64)
 
 
-def dense(matrix: SparseMap) -> torch.Tensor:
-    n_columns = len(matrix.transposed_offsets) - 1
-    rows = torch.repeat_interleave(torch.arange(len(matrix.offsets) - 1), matrix.offsets.diff())
-    out = torch.zeros(len(matrix.offsets) - 1, n_columns, dtype=matrix.weights.dtype)
-    return out.index_put_((rows, matrix.columns.long()), matrix.weights, accumulate=True)
+def dense(matrix: SparseRows) -> torch.Tensor:
+    """The whole matrix, image by image."""
+    row = torch.repeat_interleave(torch.arange(len(matrix.places)), matrix.offsets.diff())
+    out = torch.zeros(matrix.places.numel(), len(matrix.images), dtype=matrix.weights.dtype)
+    for places, images in zip(matrix.places.T.long(), matrix.images.T.long()):
+        out.index_put_((places[row], images[matrix.columns]), matrix.weights, accumulate=True)
+    return out
 
 
 def test_a_map_of_several_parts_holds_its_transpose():
     matrix = as_double(light_filters(8, [(8, 0.3), (4, 0.4)]))
     values = torch.randn(64, 3, generator=generator(), dtype=torch.float64)
-    torch.testing.assert_close(sparse_product(matrix, values), dense(matrix) @ values, rtol=1e-12, atol=1e-12)
-    torch.testing.assert_close(dense(SparseMap(*matrix[3:], *matrix[:3])), dense(matrix).T, rtol=0, atol=0)
+    torch.testing.assert_close(sparse_product(matrix, values), dense(matrix.rows) @ values, rtol=1e-12, atol=1e-12)
+    torch.testing.assert_close(dense(matrix.transposed), dense(matrix.rows).T, rtol=0, atol=0)
+
+
+def test_the_rows_of_a_filter_are_lobes_about_their_texels_in_all_quarters_of_the_map():
+    """A lobe scales a light that is linear in the direction by the factor of degree 1."""
+    axes = torch.tensor([[1.0, 2.0, 3.0], [-2.0, 1.0, 0.5], [0.0, 0.0, 1.0]]).double()
+    light, texels = octahedral_directions(32).double() @ axes, octahedral_directions(16).double()
+    averages = sparse_product(as_double(light_averages(32)), light)
+    found = sparse_product(as_double(light_filters(32, [(16, 0.5)])), averages)
+    factor = zonal_factors(0.5, 2)[0, 1].item()
+    torch.testing.assert_close(found, factor * texels @ axes, rtol=0, atol=0.04)
 
 
 def test_many_points_agree_with_few_and_do_not_depend_on_threads():

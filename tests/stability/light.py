@@ -85,8 +85,7 @@ def looked_up(rows: Rows, shared: Rows) -> Rows:
 @lru_cache(maxsize=2)
 def matrix(dtype: torch.dtype) -> ops.SparseMap:
     """Filters of an 8^2 map, the same float32 numbers in either precision."""
-    parts = ops.light_filters(8, [(8, 0.3), (4, 0.4)])
-    return ops.SparseMap(*(x.to(dtype) if x.is_floating_point() else x for x in parts))
+    return ops.light_filters(8, [(8, 0.3), (4, 0.4)]).to(dtype)
 
 
 def products(rows: Rows, shared: Rows) -> Rows:

@@ -134,12 +134,17 @@ template <class T> SPLITNERF_HD ZonalPlace<T> zonal_place(const LightPyramid<T>&
   return {p.zonal + row * kShBands, x == x ? bounded - T(row) : x, inside ? scale : T(0)};
 }
 
-// Rows of a sparse matrix: those of row r are [offsets[r], offsets[r + 1]).
+// Rows of a sparse matrix: the entries of row r are [offsets[r], offsets[r + 1]). A matrix that mirror images leave as it is holds
+// one row of each n_images: image m of row r is row places[r, m] of the whole matrix, and it has the weights of row r at the images
+// images[c, m] of its columns c.
 template <class T> struct SparseRows {
   const int64_t* offsets;
   const int32_t* columns;
   const T* weights;
+  const int32_t *places, *images;  // [n_rows, n_images], [n_columns, n_images]
   int64_t n_columns;
+  int n_images;  // 1, or kMirrorImages
 };
+constexpr int kMirrorImages = 4;  // of the octahedral map, by both signs of its first two axes
 
 }  // namespace splitnerf

@@ -31,7 +31,8 @@ SPLITNERF_API SparseMatrix light_averages(int n);
 
 // gbar(w_s, roughness) at the m^2 texel centres w_s (rows) of the light over the rows of light_averages(n).
 // Cells near the lobe's centre are small and the light in them bilinear between the n^2 texels; where the
-// lobe varies slowly they grow and the light in them is its average. Rows sum to 1.
+// lobe varies slowly they grow and the light in them is its average. Rows sum to 1. m is even; the rows are those of the quarter
+// i, j < m / 2, as the others are its mirror images.
 SPLITNERF_API SparseMatrix light_filter(int n, int m, double roughness);
 
 // Coefficients [169, n^2] of the light that is bilinear between n^2 texels (or, `cells`, constant in

@@ -344,7 +344,7 @@ class PyramidFilters(NamedTuple):
 
     def to(self, device: torch.device) -> PyramidFilters:
         """A copy on a device; resolutions and nodes stay on the CPU, as the lookup requires."""
-        sparse = (SparseMap(*(part.to(device) for part in matrix)) for matrix in self[:3])
+        sparse = (matrix.to(device) for matrix in self[:3])
         return PyramidFilters(
             *sparse, self.projection.to(device), self.projected, self.resolutions, self.nodes, self.zonal.to(device)
         )
@@ -432,9 +432,7 @@ class LightPyramid(Light):
     def __init__(self, resolution: int = 64, start: float = 0.5):
         super().__init__()
         self.resolution = resolution
-        self.texels = nn.Parameter(
-            torch.zeros(len(pyramid_filters(resolution).sum_of_levels.transposed_offsets) - 1, 3)
-        )
+        self.texels = nn.Parameter(torch.zeros(len(pyramid_filters(resolution).sum_of_levels.rows.images), 3))
         with torch.no_grad():
             self.texels[: 4 * 4] = math.log(start)
 

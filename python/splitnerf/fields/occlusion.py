@@ -14,7 +14,15 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, Light, LightTexels, mean_over, texel_roughness
-from splitnerf.ops import MeshScene, SparseMap, VisibilityCache, cached_occlusion, cached_visibility, sparse_product
+from splitnerf.ops import (
+    MeshScene,
+    SparseMap,
+    SparseRows,
+    VisibilityCache,
+    cached_occlusion,
+    cached_visibility,
+    sparse_product,
+)
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
@@ -114,7 +122,11 @@ class SkyCells(nn.Module):
             weights, order = areas / solid_angles[cell], cell.argsort(stable=True)
             starts = F.pad(cell.bincount(minlength=len(self.centres)).cumsum(0), (1, 0))
             every = torch.arange(len(cell) + 1, device=cell.device)
-            means = SparseMap(starts, order.int(), weights[order], every, cell.int(), weights)
+            texels_alone, cells_alone = (every[:n, None].int() for n in (len(cell), len(self.centres)))
+            means = SparseMap(
+                SparseRows(starts, order.int(), weights[order], cells_alone, texels_alone),
+                SparseRows(every, cell.int(), weights, texels_alone, cells_alone),
+            )
             self._cells = Cells(directions, cell, means, solid_angles)
         return self._cells
 

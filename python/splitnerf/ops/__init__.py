@@ -5,6 +5,7 @@ Each raises ValueError where a shape, dtype, number or name does not fit; the me
 
 from splitnerf.ops.light import (
     SparseMap,
+    SparseRows,
     fibonacci_directions,
     light_averages,
     light_filters,
@@ -87,6 +88,7 @@ __all__ = [
     "SdfNetwork",
     "ShadingSubset",
     "SparseMap",
+    "SparseRows",
     "TexturedSurface",
     "VisibilityCache",
     "brdf_lut",

@@ -100,44 +100,92 @@ register("sample_ggx_lobe", fake=lambda axes, roughness, n_samples, seed: axes.n
 
 
 SH_COEFFICIENTS = 169  # degrees 0 to 12
+COARSEST_AVERAGE = 8  # texels along an edge of the coarsest averages
 
 
-class SparseMap(NamedTuple):
-    """A sparse matrix by rows, and its transpose by rows for the backward pass.
+class SparseRows(NamedTuple):
+    """A sparse matrix by rows. Of one that F mirror images leave as it is, it holds one row of each F.
 
     Attributes:
         offsets: [rows + 1] int64, the index of each row's first entry.
         columns: [entries] int32 column indices.
         weights: [entries] values.
-        transposed_offsets, transposed_columns, transposed_weights: The offsets, columns and weights of the transpose.
+        places: [rows, F] int32, the rows of the whole matrix that the images of each row are; F is 1 or 4.
+        images: [columns, F] int32, the images of each column.
     """
 
     offsets: Tensor
     columns: Tensor
     weights: Tensor
-    transposed_offsets: Tensor
-    transposed_columns: Tensor
-    transposed_weights: Tensor
+    places: Tensor
+    images: Tensor
 
 
-def sparse_map(parts: list[tuple]) -> SparseMap:
-    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns)."""
-    n_columns = parts[0][3]
+class SparseMap(NamedTuple):
+    """A sparse matrix by rows, and its transpose by rows for the backward pass; see :class:`SparseRows`."""
+
+    rows: SparseRows
+    transposed: SparseRows
+
+    def to(self, to: torch.device | torch.dtype) -> SparseMap:
+        """A copy on a device, or with weights of another type."""
+        kept = isinstance(to, torch.device)
+        return SparseMap(
+            *(SparseRows(*(x.to(to) if kept or x.is_floating_point() else x for x in part)) for part in self)
+        )
+
+
+def sparse_map(parts: list[tuple], sides: tuple[list[int], list[int]] | None = None) -> SparseMap:
+    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns).
+
+    Args:
+        parts: The matrices.
+        sides: The edges of the octahedral maps that rows and columns are, one after the other, where the parts hold one
+            row of each four mirror images. None: they hold all rows.
+    """
     starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
     offsets = np.concatenate([[0]] + [part[0][1:] + start for part, start in zip(parts, starts)])
-    columns = np.concatenate([part[1] for part in parts])
-    weights = np.concatenate([part[2] for part in parts])
-    rows = np.repeat(np.arange(len(offsets) - 1, dtype=np.int32), np.diff(offsets))
-    order = np.argsort(columns, kind="stable")
-    transposed_offsets = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=n_columns))])
+    columns, weights = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    if sides is None:
+        images = [np.arange(n, dtype=np.int32)[:, None] for n in (len(offsets) - 1, parts[0][3])]
+        places = images
+    else:
+        images = [mirror_images(s) for s in sides]
+        places = [x[quarter(s)] for x, s in zip(images, sides)]
+    # The image that takes an entry's column into the quarter takes its row to a row of the transpose's entry.
+    number, image = (np.empty(len(images[1]), np.int32) for _ in range(2))
+    for k in range(places[1].shape[1]):
+        number[places[1][:, k]], image[places[1][:, k]] = np.arange(len(places[1])), k
+    rows = places[0][np.repeat(np.arange(len(offsets) - 1), np.diff(offsets)), image[columns]]
+    order = np.argsort(number[columns], kind="stable")
+    transposed_offsets = np.concatenate([[0], np.cumsum(np.bincount(number[columns], minlength=len(places[1])))])
+
+    def held(offsets, columns, weights, places, images):
+        arrays = offsets.astype(np.int64), columns, weights.astype(np.float32), places, images
+        return SparseRows(*(torch.from_numpy(np.ascontiguousarray(x)) for x in arrays))
+
     return SparseMap(
-        torch.from_numpy(offsets.astype(np.int64)),
-        torch.from_numpy(columns),
-        torch.from_numpy(weights).float(),
-        torch.from_numpy(transposed_offsets.astype(np.int64)),
-        torch.from_numpy(rows[order]),
-        torch.from_numpy(weights[order]).float(),
+        held(offsets, columns, weights, places[0], images[1]),
+        held(transposed_offsets, rows[order], weights[order], places[1], images[0]),
     )
+
+
+def mirror_images(sides: list[int]) -> np.ndarray:
+    """[texels, 4] int32, for texels of octahedral maps, one map after the other: the texels themselves, and those at the other
+    sign of the first axis, of the second, and of both."""
+    maps, start = [], 0
+    for side in sides:
+        numbers = start + np.arange(side * side, dtype=np.int32).reshape(side, side)
+        flipped = numbers, numbers[:, ::-1], numbers[::-1], numbers[::-1, ::-1]
+        maps.append(np.stack([x.ravel() for x in flipped], axis=1))
+        start += side * side
+    return np.concatenate(maps)
+
+
+def quarter(sides: list[int]) -> np.ndarray:
+    """The numbers of the texels of which all others are :func:`mirror_images`."""
+    texels = [np.arange(side * side).reshape(side, side)[: side // 2, : side // 2].ravel() for side in sides]
+    return np.concatenate([x + start for x, start in zip(texels, np.cumsum([0] + [side * side for side in sides]))])
 
 
 def light_sum_of_levels(resolution: int) -> SparseMap:
@@ -155,15 +203,19 @@ def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMa
     """The matrix from the averages of :func:`light_averages` to gbar(w, rho) at the texel centres of octahedral maps.
 
     Each row holds the integrals of ``D (w.w_s)+`` over cells, divided by their sum, so that a constant light is
-    preserved. Cells are larger where the lobe varies slowly. The lobe is not truncated.
+    preserved. Cells are larger where the lobe varies slowly. The lobe is not truncated. A quarter of the rows is stored: the
+    others are mirror images.
 
     Args:
         resolution: Texels along an edge, n: a power of 2 >= 8.
-        targets: The resolution m and the roughness rho of each map, which has m^2 rows.
+        targets: The even resolution m and the roughness rho of each map, which has m^2 rows.
 
     Source: SplitNeRF Eq. (11).
     """
-    return sparse_map([_core.light_filter(resolution, m, rho) for m, rho in targets])
+    averaged = [resolution >> k for k in range(resolution.bit_length() - COARSEST_AVERAGE.bit_length() + 1)]
+    return sparse_map(
+        [_core.light_filter(resolution, m, rho) for m, rho in targets], ([m for m, _ in targets], averaged)
+    )
 
 
 def sh_projection(resolution: int, cells: bool) -> Tensor:
@@ -184,7 +236,7 @@ def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
 
     Column indices are not checked: they come from the functions above.
     """
-    return lib.sparse_product(*matrix, values)
+    return lib.sparse_product(*matrix.rows, *matrix.transposed, values)
 
 
 def light_lookup(
@@ -215,18 +267,18 @@ def light_lookup(
 
 
 def _keep_map(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:6])
+    ctx.save_for_backward(*inputs[:10])
 
 
 def _map_backward(ctx, grad):
-    refuse_gradients(ctx, "sparse_product", weights=2, transposed_weights=5)
-    forward, transposed = ctx.saved_tensors[:3], ctx.saved_tensors[3:]
-    return *[None] * 6, lib.sparse_product(*transposed, *forward, grad)
+    refuse_gradients(ctx, "sparse_product", weights=2, transposed_weights=7)
+    rows, transposed = ctx.saved_tensors[:5], ctx.saved_tensors[5:]
+    return *[None] * 10, lib.sparse_product(*transposed, *rows, grad)
 
 
 register(
     "sparse_product",
-    fake=lambda *inputs: inputs[6].new_empty(inputs[0].shape[0] - 1, 3),
+    fake=lambda *inputs: inputs[10].new_empty(inputs[3].numel(), 3),
     setup_context=_keep_map,
     backward=_map_backward,
 )

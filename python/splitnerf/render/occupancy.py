@@ -16,7 +16,8 @@ from splitnerf.render.rays import projected
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
-REFRESHED_SHARE = 0.1  # share of the cells far from the surface that an update evaluates
+REFRESHED_SHARE = 0.1, 0.02  # share of the cells far from the surface that an update evaluates, and from SETTLED on
+SETTLED = 1000  # steps, after which the surface moves little
 NEAR_MARGIN = 1.1  # growth of the bound from one update to the next on a GPU, as the sharpness falls
 WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
@@ -63,7 +64,7 @@ class OccupancyGrid:
         Args:
             sdf: A function from points [n, 3] to signed distances [n], scene units.
             s: Sharpness of the NeuS density, positive.
-            first: Whether to evaluate all cells; otherwise the cells near the surface and a random tenth of all cells.
+            first: Whether to evaluate all cells; otherwise the cells near the surface and a random share of all cells.
             step: The number of the training step.
             use_hull: Whether the cells of the visual hull stay occupied.
         """
@@ -71,7 +72,7 @@ class OccupancyGrid:
         if first:
             due = torch.arange(len(self.values), device=self.device)
         else:
-            due = self._due(self.values.abs() < 2.0 * bound)
+            due = self._due(self.values.abs() < 2.0 * bound, REFRESHED_SHARE[step >= SETTLED])
         self.values[due] = evaluate(sdf, self.centres()[due])
         if self.values.device.type == "cuda":
             self._n_near = start_fetching((self.values.abs() < 2.0 * NEAR_MARGIN * bound).sum())
@@ -80,14 +81,14 @@ class OccupancyGrid:
         cells[self.values < -bound] = CELL_OPAQUE
         self._set(cells, use_hull)
 
-    def _due(self, near: Tensor) -> Tensor:
-        """The cells of a mask, and a random tenth of all. On a GPU the host waits for no count: the last update has
+    def _due(self, near: Tensor, share: float) -> Tensor:
+        """The cells of a mask, and a random share of all. On a GPU the host waits for no count: the last update has
         counted with a wider bound, and the first cell is the padding."""
         if self._n_near is None:
-            return (near | (torch.rand_like(self.values) < REFRESHED_SHARE)).nonzero().squeeze(1)
+            return (near | (torch.rand_like(self.values) < share)).nonzero().squeeze(1)
         count, wait = self._n_near
         wait()
-        anywhere = torch.randint(len(near), (int(REFRESHED_SHARE * len(near)),), device=near.device)
+        anywhere = torch.randint(len(near), (int(share * len(near)),), device=near.device)
         return torch.cat([torch.nonzero_static(near, size=int(count))[:, 0].clamp(min=0), anywhere])
 
     def _set(self, cells: Tensor, use_hull: bool) -> None:

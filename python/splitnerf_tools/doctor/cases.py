@@ -206,9 +206,13 @@ def matrix() -> dict:
         offsets=torch.tensor([0, 2, 3]),
         columns=torch.tensor([0, 1, 1], dtype=torch.int32),
         weights=torch.tensor([1.0, 2.0, 3.0]),
+        places=torch.arange(2, dtype=torch.int32)[:, None],
+        images=torch.arange(2, dtype=torch.int32)[:, None],
         transposed_offsets=torch.tensor([0, 1, 3]),
         transposed_columns=torch.tensor([0, 0, 1], dtype=torch.int32),
         transposed_weights=torch.tensor([1.0, 2.0, 3.0]),
+        transposed_places=torch.arange(2, dtype=torch.int32)[:, None],
+        transposed_images=torch.arange(2, dtype=torch.int32)[:, None],
         values=pattern(2, 3),
     )
 

@@ -71,18 +71,21 @@ template <class T> struct LightLookupBody {
 };
 SPLITNERF_ON_GPU(LightLookupBody);
 
-// products [n_rows, 3] = matrix . values [n_columns, 3]; a group of threads a row.
+// products [n_rows n_images, 3] = matrix . values [n_columns, 3]; a group of threads a row and image.
 template <class T> struct SparseProductBody {
   SparseRows<T> matrix;
   const T* values;
   T* products;
 
-  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t r) const {
+  template <class Group> SPLITNERF_HD void operator()(const Group& group, int64_t i) const {
+    const int64_t r = i / matrix.n_images;
+    const int m = static_cast<int>(i % matrix.n_images);
     Vec3<T> sum{T(0), T(0), T(0)};
     for (int64_t k = matrix.offsets[r] + group.lane(); k < matrix.offsets[r + 1]; k += Group::size)
-      sum += load3(values + 3 * int64_t(matrix.columns[k])) * matrix.weights[k];
+      sum += load3(values + 3 * int64_t(matrix.images[matrix.n_images * int64_t(matrix.columns[k]) + m])) *
+             matrix.weights[k];
     sum = sum3(group, sum);
-    if (group.lane() == 0) store3(products + 3 * r, sum);
+    if (group.lane() == 0) store3(products + 3 * int64_t(matrix.places[i]), sum);
   }
 };
 SPLITNERF_ON_GPU(SparseProductBody);
