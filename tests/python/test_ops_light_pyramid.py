@@ -119,7 +119,7 @@ def test_averages_and_filters_keep_a_constant_and_the_total():
     torch.testing.assert_close(total, (light * angles[:, None]).sum(0), rtol=1e-6, atol=0)
     filters = light_filters(16, [(16, 0.2), (8, 0.4)])
     torch.testing.assert_close(sparse_product(filters, torch.ones(320, 3)), torch.ones(320, 3), rtol=0, atol=1e-6)
-    assert (filters.weights > 0).all()
+    assert (filters.rows.weights > 0).all()
     check_error(lambda: light_averages(12), "light_averages", "power of 2", "12")
 
 
