@@ -106,8 +106,11 @@ install: $(VENV)/.installed
 # Built again when a source of the compiled half or the project's own requirements change.
 SOURCES := $(shell find cpp third_party -type f) CMakeLists.txt pyproject.toml
 $(VENV)/.installed: $(SOURCES) | system
-	sh third_party/install_python_packages.sh $(PYTHON) $(VENV)
-	$(CACHED) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps -e .
+	@echo 'installing the packages of Python into $(VENV): torch alone is 200 MB'
+	@began=$$(date +%s); sh third_party/install_python_packages.sh $(PYTHON) $(VENV) && echo "  took $$(($$(date +%s) - began)) s"
+	@echo 'compiling: 2 to 5 minutes on 2 cores'
+	@began=$$(date +%s); $(CACHED) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps -e . && \
+	  echo "  took $$(($$(date +%s) - began)) s"
 	@touch $@
 
 lock: install

@@ -154,6 +154,7 @@ class Step:
     ):
         self.model, self.grid, self.mesh, self.generator = model, grid, mesh, generator
         self.optimiser, self.exposures, self.seen = optimiser, exposures, seen
+        self.parameters = list(model.parameters())
         self.capacity, self.skipped, self._skipped_in_a_row = Capacity(), 0, 0
 
     def __call__(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> Iterable[StepNumbers]:
@@ -195,7 +196,7 @@ class Step:
 
     def fetch(self, step: int, batch: Batch, ray: RenderedRays, terms: Terms) -> PendingNumbers:
         """Starts to fetch the numbers of a step whose gradients are at the parameters."""
-        gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
+        gradients = [p.grad for p in self.parameters if p.grad is not None]
         numbers = torch.stack(
             [*(term.value for term in terms.values()), torch.nn.utils.get_total_norm(gradients, foreach=True)]
         )
@@ -269,7 +270,8 @@ class Step:
             terms.add({"start": SHAPE_WEIGHT}, self.start.shape_loss(ray))
             drawn = found.positions[len(found.directions) :][len(ray.anywhere) - POINTS : len(ray.anywhere)]
             terms.add({"near_start": SHAPE_WEIGHT}, self.start.left(ray.anywhere[-POINTS:], drawn).mean())
-        self.model.zero_grad(set_to_none=True)
+        for parameter in self.parameters:
+            parameter.grad = None
         terms.backward()
         return ray, terms
 
