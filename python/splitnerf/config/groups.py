@@ -92,7 +92,7 @@ class SurfaceSettings:
     )
     normals: str = setting(
         "analytic",
-        "how the normals are derived from the distance; finite_difference: the paper",
+        "how the normals are derived from the distance; finite_difference: the released code",
         choices=("analytic", "finite_difference"),
     )
 
@@ -181,7 +181,7 @@ class SamplingSettings:
     min_weight: float = setting(1e-3, "weight below which samples are left out; 0 takes all", at_least=0.0, below=1.0)
     occupancy: str = setting(
         "distance",
-        "how empty cells are found: distance bounds the density; average: a mean over time (the paper)",
+        "how empty cells are found: distance bounds the density; average: a mean over time (the released code)",
         choices=("distance", "average"),
     )
     grid_resolution: int = setting(
