@@ -9,6 +9,7 @@
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make docs   builds the documentation into build/docs (HTML, to be read without a network)
 # make figures   draws the figures of docs/method.md with the operators
+# make results   trains on whole scenes for hours, and writes their pages of docs/benchmarks; PAGE names some
 # make viewer   builds the page of splitnerf view and the script of report.html from their sources (needs Node and npm)
 # make wheels   builds a wheel for each Python from 3.10 to 3.13 that is found, into build/wheels
 # make lock   renews third_party/requirements.lock, the versions and hashes of what `make install` brings
@@ -25,9 +26,10 @@ STABILITY_OPTIONS ?=
 # With a compiler cache, what the package has compiled is not compiled again for the tests: by the same name of the compiler.
 CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true)
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
+PAGE ?=
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures lock wheels clean
+.PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures results lock wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -94,6 +96,9 @@ docs: install
 
 figures: install
 	$(BIN)/python tests/bench/method_figures.py
+
+results: install
+	$(BIN)/python tests/bench/results.py $(PAGE)
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow

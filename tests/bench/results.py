@@ -1,0 +1,258 @@
+"""Whole reconstructions with their scores: pages of docs/benchmarks, made by `splitnerf` alone.
+
+    python tests/bench/results.py [shapes|scenes|time ...] [--list] [--work runs/results]
+
+    shapes    eight hollow shapes in three materials, 4 minutes each
+    scenes    objects with full truth, 30 minutes each
+    time      error against time: half a minute to 30 minutes, two objects, two seeds
+
+Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
+Each run becomes rows of PAGE.csv as soon as it ends; the command goes on where it was interrupted. Rows of other minutes or
+images stay. --list says what is missing and how long it takes. Scenes of the folder SPLITNERF_DATA are left out where it is
+not there. A run that fails leaves no row, and the next one begins.
+"""
+
+import argparse
+import csv
+import datetime
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from splitnerf.data.images import write_image
+from splitnerf.data.json_files import read_json
+from splitnerf.files import atomic_path
+from splitnerf_tools.bench.charts import write_csv
+from splitnerf_tools.bench.provenance import header, provenance
+from splitnerf_tools.demo.scene import build_environment
+from splitnerf_tools.synth.shapes import MATERIALS, SHAPES
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))
+SOURCES = ("cpp", "python/splitnerf")
+SCORES = {  # column: the evaluation's keys, digits
+    "relit, dB": (("relight", "psnr"), 1),
+    "albedo, dB": (("albedo", "psnr"), 1),
+    "unscaled relit, dB": (("relight", "raw", "psnr"), 1),
+    "novel views, dB": (("novel_view", "psnr"), 1),
+    "normals, degrees": (("normal_mae_deg",), 1),
+    "roughness": (("roughness_mae",), 2),
+    "metallic": (("metallic_balanced_accuracy",), 2),
+    "light, dB": (("light_psnr",), 1),
+    "F-score": (("f_score",), 3),
+}
+KEYS = ("scene", "minutes", "seed", "images", "threads", "asset")
+COLUMNS = (*KEYS, *SCORES, "seconds", "commit", "date")
+HARD = {  # the light of the photos; three others relight it
+    "knot": "lebombo_1k.hdr",
+    "rings": "christmas_photo_studio_07_1k.hdr",
+    "basket": "potsdamer_platz_1k.hdr",
+}
+RELIGHTS = "blender_city.exr", "blender_sunset.exr", "kloppenheim_05_1k.hdr"
+Row = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page: its title, what it holds, and its runs."""
+
+    title: str
+    scenes: tuple[str, ...]
+    minutes: tuple[float, ...]
+    size: int
+    seeds: int = 1
+
+
+PAGES = {
+    "shapes": Page(
+        "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (4,), 120
+    ),
+    "scenes": Page("Objects", ("boombox", "avocado", "corset", "teapot", *HARD), (30,), 200),
+    "time": Page("Error against time", ("boombox", "knot"), (0.5, 1, 2, 4, 8, 15, 30), 200, 2),
+}
+
+
+def splitnerf(*words: object) -> bool:
+    """Runs a command of the program; returns whether it succeeded."""
+    return subprocess.run([sys.executable, "-m", "splitnerf", *map(str, words)]).returncode == 0
+
+
+def data_of(scene: str, size: int, work: Path) -> Path | None:
+    """The folder of a scene's images, which are rendered if they are not there yet; None where that is impossible."""
+    if (ready := DATA / "scenes" / scene).is_dir():
+        return ready
+    data, counts = (
+        work / f"data/{scene.replace(' ', '_')}_{size}",
+        ("--size", size, "--train", 60, "--test", 6, "--spp", 64),
+    )
+    if (data / "transforms_test.json").is_file():  # the last file of a data set
+        return data
+    shutil.rmtree(data, ignore_errors=True)
+    if scene in HARD:
+        light, relights = DATA / "hdri" / HARD[scene], [DATA / "hdri" / name for name in RELIGHTS]
+        if not light.is_file():
+            return None
+        script = Path(__file__).with_name("hard_scenes.py")
+        subprocess.run([sys.executable, script, work, "--only", scene], check=True)
+        words = work / f"{scene}.glb", "--light", light, "--relight", *relights
+    elif " " in scene:
+        light = work / "demo_sky.hdr"
+        write_image(light, build_environment())
+        shape, material = scene.split()
+        words = "--shape", shape, "--material", material, "--light", light
+    else:
+        return None
+    return data if splitnerf("synth", *words, "--out", data, *counts) else None
+
+
+def rows_of(scene: str, minutes: float, seed: int, page: Page, work: Path) -> list[Row]:
+    """Trains on a scene and scores the run; no rows where that failed or the data are not there."""
+    if (data := data_of(scene, page.size, work)) is None:
+        print(f"{scene}: no data, left out", file=sys.stderr)
+        return []
+    run = work / f"runs/{scene.replace(' ', '_')}_{minutes:g}_{seed}"
+    commit = provenance(SOURCES)["commit"]  # before, as the sources may change meanwhile
+    if not splitnerf("train", data, "--out", run, "--max-minutes", minutes, "--seed", seed, "--overwrite"):
+        return []
+    rows = []
+    for asset, file in (("trained", run / "trained/mesh.glb"), ("refined", run)):
+        scores = run / f"{asset}.json"
+        if not splitnerf("evaluate", file, "--data", data, "--spp", 64, "--views", 6, "--out", scores):
+            return []
+        key = scene, f"{minutes:g}", str(seed), f"{page.size}", os.environ.get("OMP_NUM_THREADS", "all"), asset
+        rows.append(dict(zip(KEYS, key)) | scored(read_json(scores, "novel_view"), commit))
+    return rows
+
+
+def scored(evaluation: dict, commit: str) -> Row:
+    """The columns of a row that follow from an evaluation; scores without truth are empty."""
+    row = {"seconds": f"{evaluation.get('seconds') or 0:.0f}"}
+    for column, (keys, digits) in SCORES.items():
+        value = evaluation
+        for name in keys:
+            value = value.get(name) if isinstance(value, dict) else None
+        row[column] = "" if value is None else f"{value:.{digits}f}"
+    now = datetime.datetime.now(datetime.timezone.utc)
+    return row | {"commit": commit, "date": f"{now:%Y-%m-%d %H:%M}"}
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of an earlier table; none without a file."""
+    if not path.is_file():
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def write_page(out: Path, name: str, rows: list[Row]) -> None:
+    """Writes NAME.csv and NAME.md; the head names the commit of the oldest row, from which the page is stale."""
+    page, oldest = PAGES[name], min(rows, key=lambda row: row["date"])
+    facts = provenance(SOURCES, f"make results PAGE={name}") | {"commit": oldest["commit"], "date": oldest["date"][:10]}
+    del facts["threads"]
+    write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
+    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in KEYS[:2]]
+    lines = [f"# {page.title}", "", header(facts), ""]
+    if name == "time":
+        draw(out / f"{name}.png", rows)
+        lines += [f"![Relit views and albedo against minutes]({name}.png)", ""]
+    lines += [
+        "*trained* is what training alone exports, *refined* what a run delivers; the minutes are those of both. Scores are defined in",
+        "[results](../results.md#how-scores-are-defined); relit views are path traced by the program.",
+        "",
+        "| " + " | ".join(shown) + " |",
+        "|" + " --- |" * len(shown),
+        *("| " + " | ".join(row[column] or "-" for column in shown) + " |" for row in rows),
+        "",
+        *means(rows),
+    ]
+    with atomic_path(out / f"{name}.md") as temporary:
+        temporary.write_text("\n".join(lines))
+
+
+def means(rows: list[Row]) -> list[str]:
+    """A line for each number of minutes: the means of the refined rows over scenes and seeds."""
+    lines = []
+    for minutes in sorted({row["minutes"] for row in rows}, key=float):
+        chosen = [row for row in rows if row["minutes"] == minutes and row["asset"] == "refined"]
+        values = {column: [float(row[column]) for row in chosen if row[column]] for column in list(SCORES)[:3]}
+        text = ", ".join(f"{column[:-4]} {sum(v) / len(v):.1f} dB" for column, v in values.items() if v)
+        lines.append(f"Mean of {len(chosen)} runs of {minutes} minutes: {text}.")
+    return [*lines, ""]
+
+
+def draw(path: Path, rows: list[Row]) -> None:
+    """Relit views and albedo against minutes, a line for each scene and asset through the means of the seeds."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for axis, column in zip(axes, list(SCORES)[:2]):
+        for k, scene in enumerate(dict.fromkeys(row["scene"] for row in rows)):
+            for asset, style in (("trained", "--"), ("refined", "-")):
+                found: dict[float, list[float]] = {}
+                for row in rows:
+                    if row["scene"] == scene and row["asset"] == asset and row[column]:
+                        found.setdefault(float(row["minutes"]), []).append(float(row[column]))
+                x = sorted(found)
+                axis.plot(
+                    x, [sum(found[m]) / len(found[m]) for m in x], style, color=f"C{k}", label=f"{scene}, {asset}"
+                )
+                axis.plot([m for m in x for _ in found[m]], [v for m in x for v in found[m]], ".", color=f"C{k}")
+        axis.set(xscale="log", xlabel="minutes", ylabel=column, xticks=x, xticklabels=[f"{m:g}" for m in x])
+        axis.minorticks_off()
+        axis.grid(alpha=0.3)
+    axes[0].legend()
+    figure.savefig(path, dpi=110)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help=f"{', '.join(PAGES)} (default: all)")
+    parser.add_argument("--work", type=Path, default=ROOT / "runs/results", help="folder of data and runs")
+    parser.add_argument("--only", nargs="+", metavar="SCENE", help="these scenes of a page")
+    parser.add_argument("--minutes", nargs="+", type=float, help="of each run, in place of the page's")
+    parser.add_argument("--again", action="store_true", help="make rows anew that are there")
+    parser.add_argument("--list", action="store_true", help="say what is missing, and run nothing")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs/benchmarks", help="default: docs/benchmarks")
+    args = parser.parse_args()
+    if unknown := [name for name in args.pages if name not in PAGES]:
+        parser.error(f"unknown page {unknown[0]}; there are {', '.join(PAGES)}")
+    args.work.mkdir(parents=True, exist_ok=True)
+    failed, total = False, 0.0
+    for name in args.pages or PAGES:
+        page, rows = PAGES[name], read_rows(args.out / f"{name}.csv")
+        for seed in range(page.seeds):
+            for scene in args.only or page.scenes:
+                for minutes in args.minutes or page.minutes:
+                    key = scene, f"{minutes:g}", str(seed)
+                    if not args.again and any(tuple(row[k] for k in KEYS[:3]) == key for row in rows):
+                        continue
+                    total += minutes
+                    if args.list:
+                        print(f"{name}: {scene}, {minutes:g} minutes, seed {seed}")
+                        continue
+                    found = rows_of(scene, minutes, seed, page, args.work)
+                    failed |= not found
+                    if found:
+                        rows = [row for row in rows if tuple(row[k] for k in KEYS[:3]) != key] + found
+                        order = {s: i for i, s in enumerate(page.scenes)}
+                        rows.sort(
+                            key=lambda r: (
+                                order.get(r["scene"], 99),
+                                float(r["minutes"]),
+                                r["seed"],
+                                r["asset"] == "refined",
+                            )
+                        )
+                        write_page(args.out, name, rows)
+    print(f"{total:g} minutes of training" + (" are missing" if args.list else ""))
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""The budget of a training step: the time of each operator on one and two threads, by instruction set, and what it moves.
+
+    python tests/bench/step.py RUN DATA [--steps 200] [--out docs/benchmarks/step.md]
+
+RUN is a finished training of DATA. The steps are those near its end. `splitnerf doctor` must pass before anything is timed.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+CASES = tuple((isa, threads) for isa in ("avx2", "avx512") for threads in (1, 2))
+LATE = 0.9  # the progress of the timed steps
+LEAST = 0.05  # ms, below which an operator is counted with the others
+SOURCES = (
+    "cpp/src",
+    "cpp/include",
+    "cpp/torch",
+    "python/splitnerf/training",
+    "python/splitnerf/render",
+    "python/splitnerf/fields",
+)
+
+
+def measured(run: Path, data: Path, n_steps: int) -> dict:
+    """Times and counts of this process's steps: ms a step, then for each operator ms, calls and bytes a step."""
+    import torch
+    from splitnerf.pipeline import load_splits
+    from splitnerf.training.checkpoint import config_of, load_checkpoint
+    from splitnerf.training.loop import Training
+    from torch.profiler import ProfilerActivity, profile
+    from torch.utils._python_dispatch import TorchDispatchMode
+    from torch.utils._pytree import tree_leaves
+
+    class Bytes(TorchDispatchMode):
+        """Adds up the sizes of the tensors that each operator reads and writes."""
+
+        def __init__(self):
+            super().__init__()
+            self.moved = Counter()
+
+        def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+            result = func(*args, **(kwargs or {}))
+            tensors = {id(x): x for x in tree_leaves((args, kwargs, result)) if isinstance(x, torch.Tensor)}
+            self.moved[func.name().split(".")[0]] += sum(x.numel() * x.element_size() for x in tensors.values())
+            return result
+
+    class Silent:
+        def show(self, progress: float, message: str) -> None:
+            pass
+
+    config = config_of(load_checkpoint(run / "checkpoint.pt"))
+    dataset, _ = load_splits(data, 1, config.reading)
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copy(run / "checkpoint.pt", folder)
+        training = Training(dataset, config, Path(folder), torch.device("cpu"))
+        training.begin(resume=True)
+        training.progress_at = lambda step, seconds: LATE
+        training.mesh.asked_at = 1.0
+
+        def steps(n: int) -> float:
+            began = time.perf_counter()
+            for _ in range(n):
+                training.refresh()
+                training.advance(Silent())
+            return 1e3 * (time.perf_counter() - began) / n
+
+        steps(20)
+        wall = sorted(steps(n_steps // 5) for _ in range(5))[2]
+        with profile(activities=[ProfilerActivity.CPU]) as profiled:
+            steps(n_steps)
+        with Bytes() as counted:
+            steps(16)  # a whole period of what is refreshed
+        rows = {
+            event.key: (event.self_cpu_time_total / n_steps / 1e3, event.count / n_steps, counted.moved[event.key] / 16)
+            for event in profiled.key_averages()
+        }
+        big = torch.rand(1 << 24)
+        copy = min(_timed(lambda: big.clone()) for _ in range(5))
+        square = torch.rand(1024, 1024)
+        product = min(_timed(lambda: square @ square) for _ in range(5))
+        rates = {"copy": 2 * 4 * len(big) / copy / 1e9, "flops": 2 * 1024**3 / product / 1e9}
+        return {"wall": wall, "rays": training.n_rays, "rows": rows, **rates}
+
+
+def _timed(body) -> float:
+    began = time.perf_counter()
+    body()
+    return time.perf_counter() - began
+
+
+def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int) -> dict | None:
+    """What a process of its own measures; None where the processor has no such instruction set."""
+    environment = os.environ | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
+    words = [
+        *os.environ.get("STEP_PYTHON", sys.executable).split(),
+        __file__,
+        run,
+        data,
+        "--steps",
+        str(n_steps),
+        "--measure",
+    ]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        print(f"{isa}, {threads} threads: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+        return None
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def page(cases: dict[tuple[str, int], dict], head: str) -> str:
+    """The page of docs/benchmarks."""
+    isas = sorted({isa for isa, _ in cases})
+    lines = [
+        "# A training step",
+        "",
+        head,
+        "",
+        f"{next(iter(cases.values()))['rays']} rays a step, near the end of a run.",
+        "",
+    ]
+    lines += ["| | " + " | ".join(f"{isa}, {threads} thread{'s' * (threads > 1)}" for isa, threads in cases) + " |"]
+    lines += ["|---|" + "---|" * len(cases)]
+    for name, unit, key in (
+        ("a step", "ms", "wall"),
+        ("copying memory", "GB/s", "copy"),
+        ("a matrix product", "GFLOP/s", "flops"),
+    ):
+        lines.append(f"| {name}, {unit} | " + " | ".join(f"{case[key]:.1f}" for case in cases.values()) + " |")
+    for isa in isas:
+        one, two = cases[isa, 1], cases[isa, 2]
+        lines += [
+            "",
+            f"## {isa}",
+            "",
+            "| operator | ms | calls | ms on 2 threads | divided | 8 cores, by count | MB | GB/s |",
+        ]
+        lines += ["|---|---|---|---|---|---|---|---|"]
+        small, eight = [0.0, 0.0, 0.0], 0.0
+        ordered = sorted(one["rows"].items(), key=lambda row: -row[1][0])
+        for name, (ms, calls, moved) in ordered:
+            on_two = two["rows"].get(name, (ms,))[0]
+            share = min(1.0, max(0.0, 2 * (1 - on_two / ms))) if ms > 0 else 0.0
+            on_eight = ms * (1 - share + share / 8)
+            eight += on_eight
+            if ms < LEAST:
+                small = [a + b for a, b in zip(small, (ms, calls, on_two))]
+                continue
+            rate = f"{moved / ms / 1e6:.1f}" if moved else "-"
+            lines.append(
+                f"| {name} | {ms:.2f} | {calls:.1f} | {on_two:.2f} | {share:.0%} | {on_eight:.2f} | {moved / 1e6:.2f} | {rate} |"
+            )
+        lines.append(
+            f"| all others, each below {LEAST} ms | {small[0]:.2f} | {small[1]:.0f} | {small[2]:.2f} | | | | |"
+        )
+        total, on_two = (sum(row[0] for row in case["rows"].values()) for case in (one, two))
+        lines.append(f"| sum | {total:.2f} | | {on_two:.2f} | | {eight:.2f} | | |")
+    lines += [
+        "",
+        "Times of operators are those of torch's profiler, which makes each call about a microsecond longer. MB are the tensors that an",
+        "operator reads and writes; GB/s are MB over ms. *Divided* is the share of the time that two threads halve, and *8 cores* follows",
+        "from it by Amdahl's law; it was not measured.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("run", type=Path)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--steps", type=int, default=200)
+    parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/step.md"))
+    parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.measure:
+        print(json.dumps(measured(args.run, args.data, args.steps)))
+        return
+    from splitnerf_tools.bench.provenance import header, provenance
+    from splitnerf_tools.doctor.self_test import failures
+
+    if failed := failures("cpu"):
+        sys.exit(f"nothing is timed, as operators fail their test: {failed}")
+    cases = {case: asked(args.run, args.data, args.steps, *case) for case in CASES}
+    cases = {case: found for case, found in cases.items() if found is not None}
+    facts = provenance(SOURCES, f"python tests/bench/step.py {args.run.name} {args.data.name}")
+    del facts["threads"], facts["kernels"]
+    args.out.write_text(page(cases, header(facts)))
+    print(args.out)
+
+
+if __name__ == "__main__":
+    main()
