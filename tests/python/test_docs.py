@@ -151,6 +151,13 @@ def test_the_method_names_tests_and_formulas_that_exist():
         assert all(name in sources for name in functions.split(", ")), (header, functions)
 
 
+def test_messages_that_are_explained_are_those_of_the_program():
+    sources = "".join(path.read_text() for path in sorted((ROOT / "python").rglob("*.py")))
+    spoken = re.sub(r'"\s*\n\s*f?"', "", sources)
+    messages = re.findall(r"^\| `([^`]+)` \|", (ROOT / "docs/troubleshooting.md").read_text(), re.MULTILINE)
+    assert len(messages) > 8 and not [message for message in messages if message not in spoken]
+
+
 def test_the_reference_holds_every_operator():
     pages = "\n".join(page.read_text() for page in (ROOT / "docs" / "reference").glob("*.md"))
     held = re.findall(r"^\.\. (?:autofunction|autoclass|py:data):: (\w+)$", pages, re.MULTILINE)
