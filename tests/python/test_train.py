@@ -178,6 +178,8 @@ def test_the_paper_preset_takes_steps(data, tmp_path):
     assert main([*command, *as_options(settings)]) == DONE
     assert (run / "evaluation.json").stat().st_size > 0 and list((run / "previews").iterdir())
     assert Config.read(run / "config.toml").shading.fresnel == "paper"
+    assert main(["evaluate", str(run), "--data", str(data), "--views", "1"]) == DONE, "at the downscale of the run"
+    assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--downscale", "1"]) == BAD_INPUT
 
 
 # ---- observers ----

@@ -36,7 +36,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="DATA",
         help="the data that RUN was trained on; once for all, or once for each RUN in order",
     )
-    add("--downscale", type=int, default=1, metavar="N", help="average images down by N, as in training (default: 1)")
+    add("--downscale", type=int, metavar="N", help="average images down by N (default: as in training)")
     add_reading_options(parser, "as in training")
     add("--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)")
     add("--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)")
@@ -117,7 +117,7 @@ def check_usage(args: argparse.Namespace) -> None:
     if not args.data and given:
         raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
     ruled_out = [name for name in OWN_RULES if getattr(args, name) is not None]
-    if args.protocol and (ruled_out or args.downscale != 1):
+    if args.protocol and (ruled_out or args.downscale is not None):
         name = (ruled_out or ["downscale"])[0].replace("_", "-")
         raise InputError(f"--{name} cannot be used with --protocol, which has rules of its own; leave it out")
     if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
@@ -148,8 +148,11 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.scoring import Protocol, evaluate_asset, evaluation_path, is_asset
     from splitnerf.pipeline import evaluate_run
+    from splitnerf.run_folder import data_of
 
-    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
+    _, trained_at = data_of(target if target.is_dir() else target.parent) or (None, 1)
+    downscale = trained_at if args.downscale is None else args.downscale
+    protocol = Protocol(downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
     if is_asset(target):
         evaluated = evaluate_asset(target, data, protocol, args.env)
         write_json(args.out or evaluation_path(target), evaluated.scores)
