@@ -56,6 +56,7 @@ from splitnerf.run_folder import (
     refuse_no_run,
     write_data_of,
 )
+from splitnerf.training.batches import without_fine_levels
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
 from splitnerf.training.loop import Training
 from splitnerf.training.meshes import SurfaceMesh
@@ -104,6 +105,7 @@ def reconstruct(
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
         config = for_turntable(config) if dataset.light_turns is not None else config
+        config = without_fine_levels(dataset, config)
         training = Training(dataset, config, run, torch.device(device), observer)
         training.begin(resume)
         begin_run(run, config, dataset, overwrite)

@@ -22,7 +22,15 @@ from splitnerf.errors import InputError
 from splitnerf.ops import draw_rays
 from splitnerf.render.occupancy import widened
 from splitnerf.training import loop
-from splitnerf.training.batches import PixelSource, averaging_factor, pixel_list, reduced, runs_of, training_photos
+from splitnerf.training.batches import (
+    PixelSource,
+    averaging_factor,
+    pixel_list,
+    reduced,
+    runs_of,
+    training_photos,
+    without_fine_levels,
+)
 from test_known_pixels import ignoring_scene
 from test_pixels import scene
 from tiny_runs import tiny, train_scene
@@ -232,6 +240,16 @@ def test_a_pixel_is_at_most_as_wide_as_the_setting_says(wanted, factor, data):
     assert factor == 1 or width <= config.sampling.pixel_cells
     finer = config.replace({"growth": s.growth * 2 ** (1 / (s.n_levels - 1))})
     assert averaging_factor(dataset, finer) == max(1, factor // 2) or wanted == 9.0
+
+
+@pytest.mark.parametrize("least, n_levels", [(0.0, 9), (1.2, 6), (1e3, 4)])
+def test_levels_finer_than_the_photos_are_left_out(least, n_levels, data):
+    """Cells are 1, 1/2, 1/4, 1/8 of the sixth level's, which is 1.25 pixels; four levels are open from the start."""
+    dataset = load_dataset(data)
+    config = Config().replace({"growth": 2.0, "least_cell": least})
+    distance, box = np.linalg.norm(dataset.poses[0, :3, 3]), config.constants.box
+    dataset.intrinsics[:, 0] = 1.25 * distance / (2 * box / (config.constants.base_resolution * 2**5))
+    assert without_fine_levels(dataset, config) == config.replace({"n_levels": n_levels})
 
 
 @pytest.mark.parametrize("shown, factor", [(0.6, 2), (0.0, 1)])

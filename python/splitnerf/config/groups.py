@@ -76,6 +76,13 @@ class SurfaceSettings:
     growth: float = setting(
         1.4697344922755988, "factor of cells from level to level (16 to 348 by default)", at_least=1, at_most=16
     )
+    least_cell: float = setting(
+        0.65,
+        "least width of a cell at the object; finer levels are left out; 0: none",
+        unit="pixels of the photos",
+        at_least=0,
+        at_most=1024,
+    )
     log2_table_size: int = setting(
         16, "binary logarithm of the entries of a level's hash table", at_least=1, at_most=24
     )

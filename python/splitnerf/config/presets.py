@@ -17,7 +17,9 @@ else:
 # source. Shares of the run stand for 20,000 steps.
 PAPER = dict(
     run=dict(preset="paper", steps=20000),
-    surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, start="sphere", normals="finite_difference"),
+    surface=dict(
+        n_levels=16, growth=1.3195079, least_cell=0.0, log2_table_size=19, start="sphere", normals="finite_difference"
+    ),
     materials=dict(inputs="outputs"),
     light=dict(kind="mlp"),
     shading=dict(method="split", fresnel="paper", query="reflection", compensate=False, compositing="srgb"),
@@ -82,7 +84,9 @@ PAPER = dict(
 # The CPU's method with the samples, the levels and the meshes of a GPU.
 FAST = dict(
     run=dict(preset="fast", steps=20000, cuda_graphs=True),
-    surface=dict(n_levels=16, growth=1.3195079, log2_table_size=19, table_dtype="float16"),  # 16 to 1024 cells
+    surface=dict(
+        n_levels=16, growth=1.3195079, least_cell=0.0, log2_table_size=19, table_dtype="float16"
+    ),  # to 1024 cells
     mesh=dict(resolution=192, background=True),
     sampling=dict(max_rays=16384, target_samples=32768, grid_resolution=128),
     export=dict(texture_size=2048),

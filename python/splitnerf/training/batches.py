@@ -16,6 +16,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.lens import pixel_width
 from splitnerf.data.pixels import Photos, ask_for, at_unit_exposure, averaged_codes, decoded, file_of
+from splitnerf.errors import note
 from splitnerf.memory import give_back
 from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
 from splitnerf.render.occupancy import visual_hull, widened
@@ -51,6 +52,22 @@ def averaging_factor(dataset: Dataset, config: Config) -> int:
     pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)
     cell = 2 * box / config.finest_cells
     return int(np.clip(config.sampling.pixel_cells * cell / pixel, 1, most))
+
+
+def without_fine_levels(dataset: Dataset, config: Config) -> Config:
+    """The settings with as many levels as have cells of at least ``surface.least_cell`` pixels at the middle of the scene's box,
+    and those that are open from the start. A note says how many are left out."""
+    surface, box = config.surface, config.constants.box
+    pixel = pixel_width(dataset.poses, dataset.intrinsics, np.zeros(3), nearest=box)
+    n_levels = surface.n_levels
+    while n_levels > config.constants.start_levels and 2 * box / config.finest_cells < surface.least_cell * pixel:
+        n_levels -= 1
+        config = config.replace({"surface.n_levels": n_levels})
+    if n_levels < surface.n_levels:
+        note(
+            f"{dataset.root}: cells finer than {surface.least_cell:g} pixels are left out: {n_levels} of {surface.n_levels} levels"
+        )
+    return config
 
 
 PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
