@@ -10,6 +10,7 @@
 # make docs   builds the documentation into build/docs (HTML, to be read without a network)
 # make figures   draws the figures of docs/method.md with the operators
 # make results   trains on whole scenes for hours, and writes their pages of docs/benchmarks; PAGE names some
+# make test-extras   installs the optional packages and the pages' tools, and runs the tests that need them
 # make viewer   builds the page of splitnerf view and the script of report.html from their sources (needs Node and npm)
 # make wheels   builds a wheel for each Python from 3.10 to 3.13 that is found, into build/wheels
 # make lock   renews third_party/requirements.lock, the versions and hashes of what `make install` brings
@@ -27,9 +28,10 @@ STABILITY_OPTIONS ?=
 CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true)
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 PAGE ?=
+EXTRAS := batch_on_ray export relight progress photos view_page report_page training_page three_page
 READERS := json colmap neus png exr hdr glb checkpoint
 
-.PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures results lock wheels clean
+.PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures results lock test-extras wheels clean
 
 demo: install
 	$(BIN)/splitnerf demo
@@ -102,6 +104,10 @@ results: install
 
 test-slow: install
 	$(BIN)/python -m pytest -q -m slow
+
+test-extras: install viewer
+	$(BIN)/python -m pip install --quiet -e '.[batch,usd,video,tensorboard,heic,raw]' --no-build-isolation
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) -rs $(EXTRAS:%=tests/python/test_%.py)
 
 system:
 	@sh third_party/install_system_packages.sh

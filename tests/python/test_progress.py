@@ -109,7 +109,7 @@ def test_scalars_and_previews_are_written(data, tmp_path):
     run.mkdir()
     for steps in (40, 44):  # the second run goes on
         with TensorBoard(tmp_path / "board") as board:
-            training = Training(load_dataset(data), config.replace({"steps": steps}), run, torch.device("cpu"), [board])
+            training = Training(load_dataset(data), config.replace({"steps": steps}), run, torch.device("cpu"), board)
             if steps == 44:
                 training.restore()
             training.complete()
@@ -138,8 +138,9 @@ def test_a_full_disk_ends_the_curves_and_not_the_run(data, tmp_path, monkeypatch
 
     monkeypatch.setattr(SummaryWriter, "add_scalar", full)
     with TensorBoard(tmp_path / "board") as board:
-        training = Training(load_dataset(data), tiny(steps=4), tmp_path, torch.device("cpu"), [board])
-        assert training.complete().step == 4
+        training = Training(load_dataset(data), tiny(steps=4), tmp_path, torch.device("cpu"), board)
+        training.complete()
+        assert training.step == 4
     said = [line for line in capsys.readouterr().err.splitlines() if "TensorBoard" in line]
     assert len(said) == 1 and str(tmp_path / "board") in said[0] and "No space left" in said[0]
 
