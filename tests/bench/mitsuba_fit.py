@@ -86,6 +86,7 @@ def main() -> None:
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
+    dr.set_thread_count(1)
     asset, light = read_asset(args.run / "trained/mesh.glb"), read_environment(args.run / "trained/environment.exr")
     material, photos = asset.materials[0], load_dataset(args.data)
     surface = material.roughness_metallic_texture
@@ -102,8 +103,8 @@ def main() -> None:
     for name in names:
         optimiser[name] = parameters[name]
     parameters.update(optimiser)
-    alpha = photos.images[..., 3:].astype(np.float32) / 255
-    colour = srgb_to_linear(photos.images[..., :3].astype(np.float32) / 255)
+    alpha = photos.images[..., 3:]
+    colour = srgb_to_linear(photos.images[..., :3])
     sensors = [sensor_of(mi, pose, k, photos.width, photos.height) for pose, k in zip(photos.poses, photos.intrinsics)]
     random, began, step = np.random.default_rng(0), time.monotonic(), 0
     while time.monotonic() - began < 60 * args.minutes:
