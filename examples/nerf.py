@@ -54,7 +54,7 @@ class NeRF(nn.Module):
         self.cells = (self.largest > 0.5).view_as(self.cells).to(torch.uint8)
 
     def forward(self, rays_o, rays_d, background, jitter):
-        samples = march_rays(rays_o, rays_d, jitter, self.cells, BOX, STEP)
+        samples = march_rays(rays_o, rays_d, jitter, self.cells, box=BOX, step=STEP)
         d = rays_d[samples.ray_indices]
         features = self.features(rays_o[samples.ray_indices] + d * samples.middles[:, None])
         colour = self.head(torch.cat([features, d, d * d, d * d.roll(1, dims=1)], dim=1))

@@ -23,7 +23,15 @@ def main() -> None:
     up = torch.tensor([[0.0, 0.0, 1.0]]).expand(len(x), 3)
     white = torch.ones(16, 32, 3)
     o_d, _ = occlusion_factors(
-        scene, positions, up, up, torch.ones(len(x), 1), white, n_diffuse_rays=8192, n_specular_rays=1, offset=OFFSET
+        scene,
+        positions,
+        up,
+        lobe_dirs=up,
+        roughness=torch.ones(len(x), 1),
+        environment=white,
+        n_diffuse_rays=8192,
+        n_specular_rays=1,
+        offset=OFFSET,
     )
     for distance, o in zip(x.tolist(), o_d[:, 0].tolist()):
         print(f"x = {distance:4.1f}   o_d = {o:.4f}  " + "#" * round(40 * o))

@@ -17,9 +17,10 @@ def bake(mesh: trimesh.Trimesh, rays: int) -> np.ndarray:
     positions = torch.tensor(np.asarray(mesh.vertices), dtype=torch.float32)
     normals = torch.tensor(np.asarray(mesh.vertex_normals), dtype=torch.float32)
     scene, one = MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces)), torch.ones(len(positions), 1)
-    sky, offset = torch.ones(16, 32, 3), 0.01 * float(np.median(mesh.edges_unique_length))
+    light = {"lobe_dirs": normals, "roughness": one, "environment": torch.ones(16, 32, 3)}
+    offset = 0.01 * float(np.median(mesh.edges_unique_length))
     counts = {"n_diffuse_rays": rays, "n_specular_rays": 1}
-    o_d, _ = occlusion_factors(scene, positions, normals, normals, one, sky, offset=offset, **counts)
+    o_d, _ = occlusion_factors(scene, positions, normals, **light, offset=offset, **counts)
     return o_d[:, 0].numpy()
 
 

@@ -29,7 +29,7 @@ def main() -> None:
             if name == "independent":
                 lights = torch.nn.functional.normalize(torch.randn(8192, 3, generator=generator), dim=1)
             light = (1 + lights @ k)[:, None].expand(-1, 3)
-            gbar = prefilter_light(queries, torch.full((500, 1), roughness), lights, light)
+            gbar = prefilter_light(queries, torch.full((500, 1), roughness), light_dirs=lights, light=light)
             errors[name] = ((gbar - exact).square().mean() / exact.square().mean()).sqrt().item()
         print(f"roughness {roughness}: " + ", ".join(f"{name} {100 * e:.4f} %" for name, e in errors.items()))
 

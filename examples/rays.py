@@ -26,7 +26,7 @@ def main(path: str = "rays.png") -> None:
     z, x = (a.flatten() for a in torch.meshgrid(-axis, axis, indexing="ij"))
     rays_o = torch.stack([x, torch.full_like(x, -4.0), z], dim=1)  # parallel rays from outside the box
     rays_d = torch.tensor([[0.0, 1.0, 0.0]]).expand_as(rays_o)
-    samples = march_rays(rays_o, rays_d, torch.full((len(x),), 0.5), cells, BOX, STEP)
+    samples = march_rays(rays_o, rays_d, torch.full((len(x),), 0.5), cells, box=BOX, step=STEP)
 
     o, d = rays_o[samples.ray_indices], rays_d[samples.ray_indices]
     middle = samples.middles[:, None]

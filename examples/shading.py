@@ -32,21 +32,19 @@ def shade(albedo: list[float], roughness: float, metallic: float) -> torch.Tenso
     views = torch.tensor([[0.0, -1.0, 0.0]]).expand(len(normals), 3)
     one = torch.ones(len(normals), 1)
     lights = fibonacci_directions(8192, torch.Generator().manual_seed(0))
-    light = sky(lights)
+    light = {"light_dirs": lights, "light": sky(lights)}
     d = light_queries(normals, views, roughness * one)[0][: len(normals)]
-    specular = prefilter_light(d, roughness * one, lights, light)
-    diffuse = prefilter_light(normals, one, lights, light)
+    specular = prefilter_light(d, roughness * one, **light)
+    diffuse = prefilter_light(normals, one, **light)
     image = torch.ones(SIZE, SIZE, 3)
     image[hit] = split_sum_shade(
         normals,
         views,
-        torch.tensor([albedo]).expand(len(normals), 3),
-        roughness * one,
-        metallic * one,
-        specular,
-        diffuse,
-        one,
-        one,
+        albedo=torch.tensor([albedo]).expand(len(normals), 3),
+        roughness=roughness * one,
+        metallic=metallic * one,
+        specular=specular,
+        diffuse=diffuse,
     )
     return image
 

@@ -112,7 +112,8 @@ def light(height: int = 48) -> plt.Figure:
     for rho in values:
         rough = torch.full((len(asked), 1), rho, dtype=torch.float64)
         weighted, plain = (
-            ops.prefilter_light(asked, rough, around, x) for x in (sky.reshape(-1, 3) * areas, areas.expand(-1, 3))
+            ops.prefilter_light(asked, rough, light_dirs=around, light=x)
+            for x in (sky.reshape(-1, 3) * areas, areas.expand(-1, 3))
         )  # the texels are not spread evenly: each counts by its solid angle
         shown.append((f"rho = {rho:g}", (weighted / plain).reshape(height, 2 * height, 3).numpy()))
     for axis, (title, picture) in zip(axes, shown):
@@ -161,8 +162,9 @@ def occlusion(size: int = 96) -> plt.Figure:
     normals = torch.tensor([0.0, 0.0, 1.0]).expand(len(points), 3)
     lobe_dirs = torch.nn.functional.normalize(torch.tensor([0.8, 0.0, 0.6]), dim=0).expand(len(points), 3)
     rough = torch.full((len(points), 1), 0.4)
+    light = {"lobe_dirs": lobe_dirs, "roughness": rough, "environment": torch.ones(8, 16, 3)}
     rays = {"n_diffuse_rays": 512, "n_specular_rays": 512, "offset": 0.0}
-    o_d, o_s = ops.occlusion_factors(scene, points, normals, lobe_dirs, rough, torch.ones(8, 16, 3), **rays)
+    o_d, o_s = ops.occlusion_factors(scene, points, normals, **light, **rays)
     figure, axes = plt.subplots(1, 3, figsize=(11, 3.2), width_ratios=[1, 1, 1.3])
     for axis, factor, title in zip(axes, (o_d, o_s), ("$o_d$, from above", "$o_s$, lobe to the right, roughness 0.4")):
         axis.imshow(factor.reshape(size, size), cmap="gray", vmin=0, vmax=1, extent=(-2, 2, -2, 2))

@@ -7,6 +7,7 @@ import reference
 import torch
 from splitnerf.errors import note
 from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
+from splitnerf.ops.shading import SHADED
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
 from torch import Tensor
@@ -65,7 +66,7 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
         return reference.split_sum_shade(*leaves, lut, 0, True)
 
     def ours(*leaves: Tensor) -> Tensor:
-        return split_sum_shade(*leaves, compensate=True)
+        return split_sum_shade(**dict(zip(SHADED, leaves)), compensate=True)
 
     ways = {"splitnerf": ours, "torch eager": plain}
     if compiled:
@@ -89,7 +90,7 @@ def prefilter_calls(n_queries: int, n_lights: int) -> tuple[dict[str, Callable[[
         return reference.prefilter_light(*(t.to(light.dtype) for t in (queries, roughness, directions)), light)
 
     def ours(light: Tensor) -> Tensor:
-        return prefilter_light(queries, roughness, directions, light)
+        return prefilter_light(queries, roughness, light_dirs=directions, light=light)
 
     return checked({"splitnerf": ours, "torch eager": plain}, plain, light)
 

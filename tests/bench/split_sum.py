@@ -112,6 +112,7 @@ def split_errors(
     """
     count, column = len(normals), torch.ones(len(normals), 1)
     roughness, metal, colour = rho * column, metallic * column, albedo * torch.ones(count, 3)
+    material = {"albedo": colour, "roughness": roughness, "metallic": metal, "compensate": True}
     diffuse = truth(normals, 1.0)
     seen = torch.ones(count, len(light.directions))
     lamps = summed_light(
@@ -123,14 +124,13 @@ def split_errors(
         radiance = light.rest(directions.reshape(-1, 3)).view(count, n, 3)
         rest = monte_carlo_light(normals, views, roughness, directions, pdf, radiance)
         whole = LightSums(*(a + b for a, b in zip(rest, lamps)))._replace(diffuse=diffuse)
-        groups.append(shade_sums(normals, views, colour, roughness, metal, whole, True))
+        groups.append(shade_sums(normals, views, **material, sums=whole))
     true = torch.stack(groups).mean(0)
     size = true.square().mean().sqrt()
     errors = {NOISE: float(torch.stack(groups).std(0).square().mean().sqrt() / GROUPS**0.5 / size)}
-    ones = torch.ones(count, 3)
     for query in QUERIES:
         specular = truth(light_queries(normals, views, roughness, query)[0][:count], rho)
-        out = split_sum_shade(normals, views, colour, roughness, metal, specular, diffuse, ones, ones, compensate=True)
+        out = split_sum_shade(normals, views, **material, specular=specular, diffuse=diffuse)
         errors[query] = float((out - true).square().mean().sqrt() / size)
     return errors
 
@@ -138,11 +138,11 @@ def split_errors(
 def furnace() -> tuple[str, list[str], list[list[str]]]:
     """The share of constant light that a white metal reflects at normal incidence; 1 would be free of loss."""
     rows = []
-    axis, ones = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 3)
+    axis, ones, one = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 3), torch.ones(1, 1)
     for rho in ROUGHNESS:
         values = [
             split_sum_shade(
-                axis, axis, ones, torch.full((1, 1), rho), torch.ones(1, 1), ones, ones, ones, ones, compensate=on
+                axis, axis, albedo=ones, roughness=rho * one, metallic=one, specular=ones, diffuse=ones, compensate=on
             )
             for on in (False, True)
         ]

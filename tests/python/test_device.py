@@ -79,7 +79,7 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
 
         monkeypatch.setattr(module, name, called)
 
-    waiting(renderer, "march_rays", lambda *_: False)
+    waiting(renderer, "march_rays", lambda *_, **__: False)
     waiting(renderer, "sample_rays", lambda *_, capacity, **__: capacity > 0)
     waiting(renderer, "spread_samples", lambda *args: args[5] is not None)
     waiting(model, "wide_lobes", lambda *args: args[4] is not None)
@@ -128,7 +128,9 @@ def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
     """Where each part costs the host its launches; the CPU takes parts that stay in its caches."""
     parts, shade = [], model.split_sum_shade
     monkeypatch.setattr(model, "SHADED_CHUNK", model.SHADED_CHUNK | {"cpu": 50})
-    monkeypatch.setattr(model, "split_sum_shade", lambda *args: parts.append(len(args[0])) or shade(*args))
+    monkeypatch.setattr(
+        model, "split_sum_shade", lambda *args, **named: parts.append(len(args[0])) or shade(*args, **named)
+    )
     torch.manual_seed(0)
     with pretend_gpu(monkeypatch):
         scene = SceneModel(tiny(open_below=0.0)).to(device)

@@ -139,10 +139,15 @@ class TestLoss:
         batch = self.batch(0.5)
         mean = torch.from_numpy(srgb_to_linear(batch.target[:, :3].numpy())) / 0.5
         mean[0, 2] = 7.0
-        colour, _ = pixel_losses(mean * batch.exposure, torch.ones(1), batch.target, batch.background)
+        colour, _ = pixel_losses(mean * batch.exposure, torch.ones(1), target=batch.target, background=batch.background)
         assert float(colour) < 1e-10
         dim = mean.detach() * torch.tensor([1, 1, 0.2])
-        assert float(pixel_losses(dim * batch.exposure, torch.ones(1), batch.target, batch.background)[0]) > 0.005
+        assert (
+            float(
+                pixel_losses(dim * batch.exposure, torch.ones(1), target=batch.target, background=batch.background)[0]
+            )
+            > 0.005
+        )
 
     def test_srgb_samples_are_compared_at_an_exposure_of_one(self):
         """And so is what lies behind the object at the masks' edges."""

@@ -247,7 +247,11 @@ def test_what_is_wrong_is_found(side, truth, monkeypatch):
 
     corrected = rendering.summed_correction
     with monkeypatch.context() as patch:
-        patch.setattr(rendering, "summed_correction", lambda *x: corrected(*x[:9], x[9].detach(), *x[10:]))
+        patch.setattr(
+            rendering,
+            "summed_correction",
+            lambda *x, radiance, **named: corrected(*x, radiance=radiance.detach(), **named),
+        )
         assert wrong() == {f"gradient of light.texels, level {i}" for i in range(3)}
     there.model.material.net[0].bias.requires_grad_(False)
     assert wrong() == {"gradient of material.net.0.bias"}

@@ -50,16 +50,17 @@ def test_lengths_that_are_none_meet_nothing(ball, t_far, meets):
 @pytest.mark.parametrize("value", BAD)
 def test_points_that_are_none_leave_the_factors_of_others_alone(ball, value):
     normals = torch.nn.functional.normalize(torch.randn(20, 3, generator=torch.Generator().manual_seed(0)), dim=1)
-    inputs = [1.0 * normals, normals.clone(), normals.clone(), torch.full((20, 1), 0.5), torch.ones(4, 8, 3)]
-    good = occlusion_factors(ball, *inputs, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
-    for i in range(3):
-        changed = [part.clone() for part in inputs]
-        changed[i][4, 0] = value
-        found = occlusion_factors(ball, *changed, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
+    inputs = {name: 1.0 * normals for name in ("positions", "normals", "lobe_dirs")}
+    light = {"roughness": torch.full((20, 1), 0.5), "environment": torch.ones(4, 8, 3)}
+    good = occlusion_factors(ball, **inputs, **light, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
+    for name in inputs:
+        changed = {key: part.clone() for key, part in inputs.items()}
+        changed[name][4, 0] = value
+        found = occlusion_factors(ball, **changed, **light, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
         others = torch.arange(20) != 4
         assert all(torch.equal(a[others], b[others]) for a, b in zip(good, found))
     if math.isfinite(value):
-        far = occlusion_factors(ball, *inputs, n_diffuse_rays=16, n_specular_rays=16, offset=value, seed=1)
+        far = occlusion_factors(ball, **inputs, **light, n_diffuse_rays=16, n_specular_rays=16, offset=value, seed=1)
         assert all((part > 0.999).all() for part in far)  # nothing is met from there
 
 

@@ -6,6 +6,7 @@ import torch
 from op_checks import unit
 from splitnerf.data.asset import Asset, Material
 from splitnerf.ops import fibonacci_directions, monte_carlo_light, shade_sums, split_sum_shade, summed_light
+from splitnerf.ops.shading import SHADED
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.subjects import MapLight
 from stability.cases import drawn_directions
@@ -72,7 +73,7 @@ def test_sums_over_directions_are_what_the_path_tracer_renders(cosine, metallic,
         directions, pdf = drawn_directions(normal, view, rho, 0.2 + 0.6 * metallic, SAMPLES)
         incoming = MapLight(environment)(directions[0])[None]
         sums = monte_carlo_light(normal, view, rho, directions, pdf, incoming)
-        shaded = shade_sums(normal, view, albedo, rho, metal, sums, compensate=True)[0]
+        shaded = shade_sums(normal, view, albedo=albedo, roughness=rho, metallic=metal, sums=sums, compensate=True)[0]
         true = path_traced(environment, cosine, roughness, metallic)
         torch.testing.assert_close(shaded, true, rtol=0.012, atol=2e-4, msg=lambda m: f"roughness {roughness}: {m}")
 
@@ -82,7 +83,8 @@ def test_sums_over_directions_are_what_the_path_tracer_renders(cosine, metallic,
 def test_the_split_sum_in_uniform_light_is_what_the_path_tracer_renders(cosine, metallic):
     one = torch.ones(1, 3)
     for roughness in ROUGHNESS:
-        shaded = split_sum_shade(*point(cosine, roughness, metallic), one, one, one, one, "exact", compensate=True)[0]
+        given = dict(zip(SHADED, point(cosine, roughness, metallic)))
+        shaded = split_sum_shade(**given, specular=one, diffuse=one, compensate=True)[0]
         true = path_traced(furnace(cosine), cosine, roughness, metallic)
         torch.testing.assert_close(shaded, true, rtol=0.012, atol=5e-4, msg=lambda m: f"roughness {roughness}: {m}")
 
@@ -95,5 +97,5 @@ def test_shared_directions_sum_to_the_same(metallic):
     area = torch.full((len(lattice),), 4 * torch.pi / len(lattice))
     seen = torch.ones(1, len(lattice))
     sums = summed_light(*given[:2], given[3], lattice, area, MapLight(environment)(lattice), seen)
-    shaded = shade_sums(*given, sums, compensate=True)[0]
+    shaded = shade_sums(**dict(zip(SHADED, given)), sums=sums, compensate=True)[0]
     torch.testing.assert_close(shaded, path_traced(environment, 0.5, 0.6, metallic), rtol=0.012, atol=2e-4)

@@ -5,7 +5,9 @@ import pytest
 import torch
 from op_cases import EVERY
 from op_checks import arguments_of, lib
+from splitnerf import ops
 from splitnerf.ops import MeshScene
+from torch.utils._pytree import tree_flatten, tree_map
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -171,3 +173,96 @@ def test_a_released_scene_raises(name):
     handle = MeshScene(np.eye(3), np.array([[0, 1, 2]])).handle
     with pytest.raises(IndexError, match=str(handle)):
         getattr(lib, name)(handle, *EVERY[name](torch.float32)[1:])
+
+
+# ---- the front page ----
+
+X, ONE = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 1)
+POINT = {"normals": X, "view_dirs": X, "albedo": X, "roughness": ONE, "metallic": ONE, "specular": X, "diffuse": X}
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: ops.split_sum_shade(**POINT | {"roughness": 0.5}),
+            "split_sum_shade: roughness must be a tensor, got float",
+        ),
+        (
+            lambda: ops.split_sum_shade(**POINT | {"normals": [0, 0, 1]}),
+            "split_sum_shade: normals must be a tensor, got list",
+        ),
+        (lambda: ops.split_sum_shade(**POINT | {"diffuse": 1}), "split_sum_shade: diffuse must be a tensor, got int"),
+        (lambda: ops.light_queries(X, None, ONE), "light_queries: view_dirs must be a tensor, got NoneType"),
+        (lambda: ops.linear_to_srgb(np.ones(3)), "linear_to_srgb: linear must be a tensor, got ndarray"),
+        (lambda: ops.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
+        (
+            lambda: ops.split_sum_shade(**POINT | {"compensate": "no"}),
+            "split_sum_shade: compensate must be of type bool, got str",
+        ),
+    ],
+)
+def test_an_argument_of_another_type_is_named_in_one_line(call, words):
+    with pytest.raises(TypeError) as error:
+        call()
+    assert str(error.value) == words
+
+
+def test_what_is_missing_or_unknown_is_named_by_python():
+    for wrong in ({}, POINT | {"colour": X}):
+        with pytest.raises(TypeError, match=r"split_sum_shade\(\) (missing|got an unexpected)"):
+            ops.split_sum_shade(**wrong)
+
+
+def batches(*shape: int) -> torch.Tensor:
+    return torch.rand(2, 5, *shape, generator=torch.Generator().manual_seed(len(shape)))
+
+
+SPEC = ops.HashGridSpec(n_levels=2, log2_table_size=6)
+SCENE = ops.MeshScene(np.eye(3), np.array([[0, 1, 2]]))
+SHADE = {name: batches(1 if name in ("roughness", "metallic") else 3) for name in ops.shading.SHADED}
+SUMS = ops.LightSums(*(batches(3) for _ in range(4)))
+LIGHT = {"light_dirs": ops.fibonacci_directions(64), "light": torch.ones(64, 3)}
+IN_BATCHES = {
+    "hash_encode": (ops.hash_encode, {"positions": batches(3)}, {"table": torch.rand(SPEC.n_entries, 2), "spec": SPEC}),
+    "light_queries": (ops.light_queries, {k: SHADE[k] for k in ("normals", "view_dirs", "roughness")}, {}),
+    "split_sum_shade": (ops.split_sum_shade, SHADE, {}),
+    "shade_sums": (ops.shade_sums, {k: SHADE[k] for k in ops.shading.SHADED[:5]} | {"sums": SUMS}, {}),
+    "prefilter_light": (ops.prefilter_light, {"query_dirs": batches(3), "roughness": batches(1)}, LIGHT),
+    "sample_ggx_lobe": (ops.sample_ggx_lobe, {"axes": batches(3), "roughness": batches(1)}, {"n_samples": 3}),
+    "occlusion_factors": (
+        ops.occlusion_factors,
+        {name: batches(3) for name in ("positions", "normals", "lobe_dirs")} | {"roughness": batches(1)},
+        {"scene": SCENE, "environment": torch.ones(2, 4, 3)},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IN_BATCHES)
+def test_points_may_have_leading_dimensions(name):
+    """[2, 5, 3] gives what [10, 3] gives, in that shape; two results a point stand one after the other in the first."""
+    call, points, rest = IN_BATCHES[name]
+    flat = tree_map(lambda x: x.flatten(0, 1), points)
+    found, expected = (tree_flatten(call(**given, **rest))[0] for given in (points, flat))
+    for a, b in zip(found, expected, strict=True):
+        assert a.shape[1] == 5 and torch.equal(a.flatten(0, 1), b)
+    if len(points) == 1:
+        return
+    last = next(reversed(points))
+    other = tree_map(lambda x: x.transpose(0, 1), points[last])
+    with pytest.raises(ValueError, match=rf"{name}: {last} must begin with \[2, 5\], got \[5, 2, \d\]"):
+        call(**points | {last: other}, **rest)
+
+
+def test_the_answers_to_queries_may_be_stacked_in_batches():
+    stacked = {k: x for k, x in SHADE.items() if k != "diffuse"}
+    stacked["specular"] = torch.cat([SHADE["specular"], SHADE["diffuse"]])
+    assert torch.equal(ops.split_sum_shade(**stacked), ops.split_sum_shade(**SHADE))
+
+
+def test_no_occlusion_means_open():
+    opened = {k: x for k, x in SHADE.items() if "occlusion" not in k}
+    one = torch.ones(2, 5, 3)
+    assert torch.equal(ops.split_sum_shade(**opened), ops.split_sum_shade(**opened, occlusion_s=one, occlusion_d=one))
+    half = ops.split_sum_shade(**opened, occlusion_d=0.5 * one)
+    assert torch.equal(half, ops.split_sum_shade(**opened, occlusion_s=one, occlusion_d=0.5 * one))

@@ -19,6 +19,7 @@ from splitnerf.ops import (
     shade_sums,
     split_sum_shade,
 )
+from splitnerf.ops.shading import SHADED
 from splitnerf.render.path_traced import AssetRenderer
 
 SIGMAS = 4.5
@@ -100,7 +101,8 @@ def reflected(light: IncomingLight, radiance: torch.Tensor, points: dict[str, to
     p = {name: x.double() for name, x in points.items()}
     lobe = p["normals"], p["view_dirs"], p["roughness"]
     sums = monte_carlo_light(*lobe, light.directions.double(), light.pdf.double(), radiance.double())
-    return shade_sums(p["normals"], p["view_dirs"], p["albedo"], p["roughness"], p["metallic"], sums, compensate=True)
+    given = {name: p[name] for name in SHADED[:5]}
+    return shade_sums(**given, sums=sums, compensate=True)
 
 
 def mean_and_error(samples: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -137,8 +139,8 @@ def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lam
         assert torch.equal(light.visible > 0, (light.directions @ normal > 0) & (light.pdf > 0))
         mean, error = mean_and_error(reflected(light, light.visible[..., None].expand(-1, -1, 3), points))
         one = torch.ones(1, 3)
-        x = [points[name][:1] for name in ("normals", "view_dirs", "albedo", "roughness", "metallic")]
-        albedo = split_sum_shade(*x, one, one, one, one, "exact", compensate=True)[0].double()
+        x = {name: points[name][:1] for name in SHADED[:5]}
+        albedo = split_sum_shade(**x, specular=one, diffuse=one, compensate=True)[0].double()
         assert (error < 0.01 * albedo).all()
         assert ((mean - albedo).abs() < SIGMAS * error + 3e-3 * albedo).all(), (mean, albedo, error)
 

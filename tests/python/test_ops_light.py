@@ -48,4 +48,6 @@ def test_gbar_against_a_million_samples_of_the_lobe(rho):
     if rho >= 0.2:
         w = fibonacci_directions(8129, generator(3), torch.float64)
         bound = {0.2: 0.03, 0.4: 0.01, 0.7: 0.01, 1.0: 0.01}[rho]
-        torch.testing.assert_close(prefilter_light(axes, roughness, w, lamp(w)), exact, rtol=bound, atol=0)
+        torch.testing.assert_close(
+            prefilter_light(axes, roughness, light_dirs=w, light=lamp(w)), exact, rtol=bound, atol=0
+        )

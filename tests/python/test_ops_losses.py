@@ -11,22 +11,27 @@ from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_lo
 # ---- pixels ----
 
 
+def losses(mean, opacity, *rest, **options):
+    named = dict(zip(("target", "background", "whole", "exposure"), rest))
+    return pixel_losses(mean, opacity, **named, **options)
+
+
 def test_an_exposure_is_a_factor_of_the_colours():
     """None is the same as 1, and no whole pixel as all that are none."""
     *photo, whole, exposure = pixel_inputs()
     scaled = [photo[0] * exposure, *photo[1:]]
-    torch.testing.assert_close(pixel_losses(*photo, whole, exposure), pixel_losses(*scaled, whole))
+    torch.testing.assert_close(losses(*photo, whole, exposure), losses(*scaled, whole))
     none = torch.zeros_like(whole), torch.ones_like(exposure)
-    assert torch.equal(pixel_losses(*photo), pixel_losses(*photo, *none))
+    assert torch.equal(losses(*photo), losses(*photo, *none))
 
 
 def test_a_clipped_photo_asks_only_for_enough():
     bright = torch.full((4, 3), 3.0, requires_grad=True)
     target, opacity = torch.ones(4, 4), torch.ones(4)
-    colour, _ = pixel_losses(bright, opacity, target, torch.zeros(4, 3), linear=False)
+    colour, _ = pixel_losses(bright, opacity, target=target, background=torch.zeros(4, 3), linear=False)
     colour.backward()
     assert colour.item() == 0.0 and torch.equal(bright.grad, torch.zeros(4, 3))
-    colour, _ = pixel_losses(0.5 * torch.ones(4, 3), opacity, target, torch.zeros(4, 3), linear=False)
+    colour, _ = pixel_losses(0.5 * torch.ones(4, 3), opacity, target=target, background=torch.zeros(4, 3), linear=False)
     assert colour.item() == pytest.approx(0.25)
 
 
@@ -37,11 +42,11 @@ def test_a_whole_pixel_is_compared_with_what_the_camera_added_up():
     whole = torch.ones(1, dtype=torch.bool)
     for alpha in (0.0, 1.0):
         target = torch.cat([seen, torch.tensor([[alpha]])], dim=1)
-        colour, mask = pixel_losses(mean, opacity, target, behind, whole)
+        colour, mask = losses(mean, opacity, target, behind, whole)
         assert colour.item() == pytest.approx(0, abs=1e-12)
         assert mask.item() == pytest.approx(-0.1 * math.log(0.3 if alpha else 0.7), rel=1e-6)
-        assert pixel_losses(mean, opacity, target, behind)[0].item() > 1e-3
-        srgb = pixel_losses(seen, opacity, target, behind, whole, linear=False)[0].item()
+        assert losses(mean, opacity, target, behind)[0].item() > 1e-3
+        srgb = losses(seen, opacity, target, behind, whole, linear=False)[0].item()
         assert srgb == pytest.approx((0.7 * (1 - seen[0, 0].item())) ** 2, rel=1e-5)
 
 
@@ -121,7 +126,7 @@ def test_a_nan_shows():
     for k, linear in ((0, True), (0, False), (1, True)):
         x = list(pixel_inputs())
         x[k][3] = math.nan
-        assert pixel_losses(*x, linear=linear)[0].isnan()
+        assert losses(*x, linear=linear)[0].isnan()
     g, w, beside = field_gradients()
     g[4, 1] = math.nan
     assert all(loss.isnan() for loss in gradient_losses(g, w, beside))

@@ -78,7 +78,14 @@ def test_occlusion_agrees_with_rays_of_embreex():
     positions, normals, lobes, roughness, _ = sample_inputs(12)
     white = torch.ones(4, 8, 3)
     got, _ = occlusion_factors(
-        scene_of(mesh), positions, normals, lobes, roughness, white, n_diffuse_rays=4096, n_specular_rays=1
+        scene_of(mesh),
+        positions,
+        normals,
+        lobe_dirs=lobes,
+        roughness=roughness,
+        environment=white,
+        n_diffuse_rays=4096,
+        n_specular_rays=1,
     )
     rng = np.random.default_rng(0)
     oracle = embreex_oracle(mesh)
@@ -90,15 +97,15 @@ def test_occlusion_agrees_with_rays_of_embreex():
 
 
 def test_seed_and_channels(scene):
-    inputs = sample_inputs(60)
+    inputs = dict(zip(("positions", "normals", "lobe_dirs", "roughness", "environment"), sample_inputs(60)))
     first, again, other, colours = (
-        occlusion_factors(scene, *inputs, seed=s, n_channels=c) for s, c in ((0, 1), (0, 1), (1, 1), (0, 3))
+        occlusion_factors(scene, **inputs, seed=s, n_channels=c) for s, c in ((0, 1), (0, 1), (1, 1), (0, 3))
     )
     for a, b, c, each in zip(first, again, other, colours):
         assert torch.equal(a, b) and not torch.equal(a, c) and each.shape == (60, 3)
         torch.testing.assert_close(a, each.mean(1, keepdim=True))
     check_error(
-        lambda: occlusion_factors(scene, *inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2"
+        lambda: occlusion_factors(scene, **inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2"
     )
 
 
@@ -107,7 +114,8 @@ def test_rays_that_start_along_themselves():
     behind, cos > 0.4, which is 1 - 0.4^2 of the cosine-weighted sky."""
     plane = trimesh.Trimesh([[-9, -9, 0.02], [9, -9, 0.02], [9, 9, 0.02], [-9, 9, 0.02]], [[0, 1, 2], [0, 2, 3]])
     up, white = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(4, 8, 3)
+    light = {"lobe_dirs": up, "roughness": torch.ones(1, 1), "environment": white}
     for along_ray, expected in ((False, 1.0), (True, 0.84)):
         settings = {"n_diffuse_rays": 4096, "offset": 0.05, "along_ray": along_ray}
-        o_d, _ = occlusion_factors(scene_of(plane), 0 * up, up, up, torch.ones(1, 1), white, **settings)
+        o_d, _ = occlusion_factors(scene_of(plane), 0 * up, up, **light, **settings)
         assert o_d.item() == pytest.approx(expected, abs=0.01)

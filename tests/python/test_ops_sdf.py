@@ -46,7 +46,7 @@ def stretches(field, samples, origins, directions, s: float, anneal: float = 1.0
 @pytest.mark.parametrize("anneal", [0.0, 0.4, 1.0])
 def test_keeps_the_neighbours_that_may_weigh(anneal):
     field, (o, d, jitter) = bumpy_field(), field_rays()
-    samples = march_rays(o, d, jitter, full_cells(), BOX, STEP)
+    samples = march_rays(o, d, jitter, full_cells(), box=BOX, step=STEP)
     weights = stretches(field, samples, o, d, 60.0, anneal)
     heavy = weights > 0.01
     wanted = heavy | torch.cat([torch.tensor([False]), heavy[:-1]])
@@ -114,7 +114,7 @@ def whole_opacity(field, samples, origins, directions) -> torch.Tensor:
 def left_out(field, s: float, anneal: float = 1.0, lipschitz: float = 1.25) -> tuple[torch.Tensor, torch.Tensor]:
     """The weights [n] that surface_weights gives to all samples, those kept set to 0, and their sums [n_rays]."""
     o, d, jitter = field_rays()
-    samples = march_rays(o, d, jitter, full_cells(), BOX, STEP)
+    samples = march_rays(o, d, jitter, full_cells(), box=BOX, step=STEP)
     at = o[samples.ray_indices] + d[samples.ray_indices] * (0.5 * (samples.t_starts + samples.t_ends))[:, None]
     there = field.sample(at)
     sharp = torch.tensor(s, dtype=torch.float64)

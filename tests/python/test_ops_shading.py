@@ -18,6 +18,7 @@ from splitnerf.ops import (
     summed_correction,
     summed_light,
 )
+from splitnerf.ops.shading import SHADED
 from stability.cases import drawn_directions
 
 # ---- the split sum ----
@@ -35,7 +36,11 @@ def test_table_made_in_inference_mode_serves_training():
 def test_an_option_that_is_not_known_is_named():
     inputs = split_sum_inputs("cpu", torch.float32)
     check_error(
-        lambda: split_sum_shade(*inputs[:9], fresnel_mode="fast"), "split_sum_shade", "fresnel_mode", "exact", "fast"
+        lambda: split_sum_shade(**dict(zip(SHADED, inputs)), fresnel_mode="fast"),
+        "split_sum_shade",
+        "fresnel_mode",
+        "exact",
+        "fast",
     )
     check_error(
         lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median"),
@@ -110,13 +115,15 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
     metal = torch.ones_like(metallic)
 
     def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
-        return split_sum_shade(normals, view_dirs, albedo, roughness, metallic, one, black, one, one)
+        point = normals, view_dirs
+        return split_sum_shade(
+            *point, albedo=albedo, roughness=roughness, metallic=metallic, specular=one, diffuse=black
+        )
 
     sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
-    there = split_sum_shade(
-        normals, view_dirs, albedo, roughness, metallic, light, diffuse, one, one, "exact", compensate
-    )
-    torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums, compensate), there)
+    material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": compensate}
+    there = split_sum_shade(normals, view_dirs, **material, specular=light, diffuse=diffuse)
+    torch.testing.assert_close(shade_sums(normals, view_dirs, **material, sums=sums), there)
 
 
 def test_light_at_grazing_angles_alone_is_reflected_whole():
@@ -124,21 +131,23 @@ def test_light_at_grazing_angles_alone_is_reflected_whole():
     normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs()
     light = sums[:, 0]
     sums = LightSums(light, light, torch.zeros_like(light), light)
-    torch.testing.assert_close(shade_sums(normals, view_dirs, albedo, roughness, metallic, sums), light)
+    torch.testing.assert_close(
+        shade_sums(normals, view_dirs, albedo=albedo, roughness=roughness, metallic=metallic, sums=sums), light
+    )
 
 
 def test_a_sum_of_another_shape_is_named():
     x = sums_inputs()
     specular, grazing, diffuse, dielectric = x[5].unbind(1)
     with pytest.raises(ValueError, match=r"grazing must be \[6, 3\], got \[6, 1\]"):
-        shade_sums(*x[:5], LightSums(specular, grazing[:, :1], diffuse, dielectric))
+        shade_sums(**dict(zip(SHADED[:5], x)), sums=LightSums(specular, grazing[:, :1], diffuse, dielectric))
 
 
 def test_the_correction_is_the_sum_less_the_split_by_its_share():
     normals, view_dirs, roughness, *light = shared_inputs(12)
     albedo, metallic, split, share = (torch.rand(12, *k, dtype=torch.float64) for k in ((3,), (1,), (3,), ()))
-    summed = shade_sums(
-        normals, view_dirs, albedo, roughness, metallic, summed_light(normals, view_dirs, roughness, *light), True
-    )
-    found = summed_correction(normals, view_dirs, albedo, roughness, metallic, split, share, *light, compensate=True)
+    material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": True}
+    summed = shade_sums(normals, view_dirs, **material, sums=summed_light(normals, view_dirs, roughness, *light))
+    named = dict(zip(("directions", "solid_angles", "radiance", "visible", "sent"), light))
+    found = summed_correction(normals, view_dirs, **material, split=split, share=share, **named)
     torch.testing.assert_close(found, (summed - split) * share[:, None])

@@ -36,7 +36,7 @@ def brute_force(lamp, normals, views, albedo, roughness, metallic) -> torch.Tens
     pdf = (1.0 / (len(w) * area)).expand(len(normals), -1)
     light = lamp(w, torch.zeros(len(w), 1)).expand(len(normals), -1, -1)
     sums = monte_carlo_light(normals, views, roughness, w.expand(len(normals), -1, 3), pdf, light)
-    return shade_sums(normals, views, albedo, roughness, metallic, sums, compensate=True)
+    return shade_sums(normals, views, albedo=albedo, roughness=roughness, metallic=metallic, sums=sums, compensate=True)
 
 
 def test_summed_light_is_nearer_to_the_integral_than_the_split():
@@ -55,8 +55,8 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     light = prefiltered(
         model.light, torch.cat([light_queries(n, views, rough)[0][:200], n]), torch.cat([rough, torch.ones_like(rough)])
     )
-    one = torch.ones(200, 3)
-    split = split_sum_shade(n, views, albedo, rough, metal, light[:200], light[200:], one, one, "exact", True)
+    one, material = torch.ones(200, 3), {"albedo": albedo, "roughness": rough, "metallic": metal}
+    split = split_sum_shade(n, views, **material, specular=light[:200], diffuse=light[200:], compensate=True)
     points = ShadedPoints(split, n, albedo, rough, metal, one, one, n, n, 0.5 * n)
     every = torch.arange(len(n))
     summed = split.index_add(0, *model.quadrature_correction(lit, views, points, every))
@@ -97,4 +97,4 @@ def test_the_furnace_of_the_whole_model(metallic):
 def prefiltered(lamp, directions, roughness) -> torch.Tensor:
     """gbar of the lamp from many directions."""
     w = torch.from_numpy(_core.fibonacci_sphere(1 << 14)).float()
-    return prefilter_light(directions, roughness, w, lamp(w, torch.zeros(len(w), 1)).detach())
+    return prefilter_light(directions, roughness, light_dirs=w, light=lamp(w, torch.zeros(len(w), 1)).detach())

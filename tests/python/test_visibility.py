@@ -18,7 +18,7 @@ UP = torch.tensor([[0.0, 0.0, 1.0]])
 def read(cache: VisibilityCache, x: torch.Tensor, n: torch.Tensor, *, light=None, radiance=None):
     """cached_occlusion at roughness 1 with the lobe about the normal."""
     light = torch.ones_like(cache.directions) if light is None else light
-    return cached_occlusion(cache, x, n, n, torch.ones(len(x), 1), light, radiance)
+    return cached_occlusion(cache, x, n, lobe_dirs=n, roughness=torch.ones(len(x), 1), light=light, radiance=radiance)
 
 
 def test_bits_and_hits_are_those_of_single_rays():

@@ -78,8 +78,10 @@ def learned() -> Rows:
 
 
 def field(rows: Rows, shared: Rows) -> Rows:
-    weights = [shared[name] for name in LEARNED]
-    outputs, features, gradient = ops.sdf_field(rows["positions"], 1e-3 * shared["table"], *weights, BETA, BOX, SPEC)
+    weights = {name: shared[name] for name in LEARNED}
+    outputs, features, gradient = ops.sdf_field(
+        rows["positions"], 1e-3 * shared["table"], **weights, beta=BETA, box=BOX, spec=SPEC
+    )
     return {"outputs": outputs, "features": features, "gradient": gradient}
 
 

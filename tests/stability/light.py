@@ -46,7 +46,7 @@ def bright(size: float) -> Rows:
 
 
 def filtered(rows: Rows, shared: Rows) -> Rows:
-    return {"gbar": ops.prefilter_light(rows["query_dirs"], rows["roughness"], shared["light_dirs"], shared["light"])}
+    return {"gbar": ops.prefilter_light(**rows, **shared)}
 
 
 def draw_lookup(draw: Draw, n: int) -> Rows:

@@ -38,8 +38,12 @@ def draw_pixels(draw: Draw, n: int) -> Rows:
 
 def pixels(rows: Rows, shared: Rows) -> Rows:
     names = ("mean", "opacity", "target", "background", "whole")
-    linear = batches(rows, names, ops.pixel_losses, ("colour", "mask"))
-    encoded = batches(rows, names, lambda *x: ops.pixel_losses(*x, linear=False), ("colour of sRGB", "mask of sRGB"))
+
+    def losses(*given: Tensor, linear: bool = True) -> Tensor:
+        return ops.pixel_losses(**dict(zip(names, given)), linear=linear)
+
+    linear = batches(rows, names, losses, ("colour", "mask"))
+    encoded = batches(rows, names, lambda *x: losses(*x, linear=False), ("colour of sRGB", "mask of sRGB"))
     return linear | encoded
 
 

@@ -151,7 +151,7 @@ def occlusion_inputs(draw: Draw, n: int) -> tuple[Rows, Tensor]:
 
 def factors(rows: Rows, sky: Tensor, low: float, high: float) -> Tensor:
     """[n] how far the occlusion factors lie beyond [low, high]."""
-    found = ops.occlusion_factors(cube(), *rows.values(), sky, n_diffuse_rays=8, n_specular_rays=8, n_channels=3)
+    found = ops.occlusion_factors(cube(), **rows, environment=sky, n_diffuse_rays=8, n_specular_rays=8, n_channels=3)
     return torch.stack([finite_in(x, low, high) for x in found]).amax(0) - 1e-6
 
 
@@ -192,7 +192,7 @@ def cached(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     rows, _ = occlusion_inputs(draw, n)
     light = torch.full((64, 3), draw.pick((0.0, 1e-38, 1.0, 1e30), 1).item())
     light[3] = max(1e6, light[0, 0].item()) if draw.chance(0.5, 1).item() else light[3]
-    o_d, o_s, i_d, i_s = ops.cached_occlusion(cache(), *rows.values(), light, torch.ones(8, 3))
+    o_d, o_s, i_d, i_s = ops.cached_occlusion(cache(), **rows, light=light, radiance=torch.ones(8, 3))
     visible, arriving = ops.cached_visibility(cache(), rows["positions"], rows["normals"], torch.ones(8, 3))
     found = (o_d, o_s, i_d, i_s, visible, arriving)
     return torch.stack([finite_in(x, 0.0, 1.0) for x in found]).amax(0) - 1e-5, rows
@@ -210,7 +210,7 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
         "rays_d": directions.float(),
         "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
     }
-    found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box, step, limit)
+    found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box=box, step=step, max_samples=limit)
     ray, start = found.ray_indices, found.t_starts.double()
     point = rows["rays_o"].double()[ray] + rows["rays_d"].double()[ray] * (start + step / 2)[:, None]
     reach = rows["rays_o"].double().norm(dim=1)[ray] + 1

@@ -3,6 +3,7 @@
 import torch
 from splitnerf import ops
 from splitnerf.ops._library import lib
+from splitnerf.ops.shading import SHADED
 from torch import Tensor
 
 from stability import exact_shading
@@ -11,7 +12,6 @@ from stability.entry import Entry, Rows
 
 UNITS = ("normals", "view_dirs", "light_dirs")
 IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d", "share")
-SHADED = ("normals", "view_dirs", "albedo", "roughness", "metallic")
 TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
 SAMPLES = 4  # directions a point
 NO_SHARE = 1e-36  # of components of directions: a cosine over pi should have a float32
@@ -88,14 +88,14 @@ def draw_lit(draw: Draw, n: int) -> Rows:
 
 
 def shade_modes(rows: Rows, shared: Rows) -> Rows:
-    given = [rows[name] for name in (*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d")]
+    given = [rows[name] for name in SHADED]
     modes = {mode: (i, False) for i, mode in enumerate(ops.FRESNEL_MODES)} | {"compensated": (0, True)}
     indirect = rows["indirect_s"], rows["indirect_d"]
     return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode, *indirect) for name, mode in modes.items()}
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [*(rows[name] for name in SHADED), torch.stack([rows[name] for name in ops.LightSums._fields], 1)]
+    given = [*(rows[name] for name in SHADED[:5]), torch.stack([rows[name] for name in ops.LightSums._fields], 1)]
     modes = {
         "single": (False, None, None),
         "compensated": (True, None, None),
@@ -175,7 +175,7 @@ ENTRIES = (
         shared=TABLE,
         repair=repaired,
         bound=2e-6,
-        smooth=(*SHADED, "specular", "diffuse", "occlusion_s", "occlusion_d"),
+        smooth=SHADED,
         gradient_bound=4e-6,
         exact=exact_shading.split_sum_shade,
         exact_bound=1e-14,
@@ -188,7 +188,7 @@ ENTRIES = (
         shared=TABLE,
         repair=lambda rows: within_the_light(repaired(rows)),
         bound=2e-6,
-        smooth=(*SHADED, *ops.LightSums._fields, "other"),
+        smooth=(*SHADED[:5], *ops.LightSums._fields, "other"),
         gradient_bound=4e-6,
         exact=exact_shading.shade_sums,
         exact_bound=1e-14,

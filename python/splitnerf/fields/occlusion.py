@@ -259,7 +259,13 @@ class VisibilityBits:
             known = [part for part in self(*chosen) if part is not None]
             return Occlusion(*(part.index_select(0, segments.segment) for part in known))
         o_d, o_s, *indirect = cached_occlusion(
-            self.cache, positions, normals, lobe_dirs, roughness, self.light, self.radiance
+            self.cache,
+            positions,
+            normals,
+            lobe_dirs=lobe_dirs,
+            roughness=roughness,
+            light=self.light,
+            radiance=self.radiance,
         )
         if self.n_channels == 1:
             o_d, o_s = o_d.mean(-1, keepdim=True), o_s.mean(-1, keepdim=True)

@@ -124,10 +124,22 @@ class SdfField(nn.Module):
 
         Differentiable once in all parameters (not in positions).
         """
-        hidden = self.hidden_direction, self.hidden_length, self.hidden_bias
-        out = self.out_direction, self.out_length, self.out_bias
-        grid = self.grid.spec, self.grid.n_active, self.grid.stored()
-        return SdfSample(*sdf_field(positions, self.grid.table, *hidden, *out, SOFTPLUS_BETA, self.box, *grid))
+        outputs, features, gradient = sdf_field(
+            positions,
+            self.grid.table,
+            hidden=self.hidden_direction,
+            hidden_length=self.hidden_length,
+            hidden_bias=self.hidden_bias,
+            out=self.out_direction,
+            out_length=self.out_length,
+            out_bias=self.out_bias,
+            beta=SOFTPLUS_BETA,
+            box=self.box,
+            spec=self.grid.spec,
+            n_active=self.grid.n_active,
+            stored=self.grid.stored(),
+        )
+        return SdfSample(outputs, features, gradient)
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
         """The values of :meth:`sample`, with the gradient by central differences (six evaluations).

@@ -1,6 +1,7 @@
 """The operators of SplitNeRF: ``torch.ops.splitnerf.*`` with typed, documented wrappers.
 
-Each raises ValueError where a shape, dtype, number or name does not fit; the message names the operator and the argument.
+Each raises ValueError where a shape, dtype, number or name does not fit, TypeError where a tensor or a number is needed; the message
+names the operator and the argument. Where arguments are [n, ...] for n points, n may be any leading dimensions in their place.
 """
 
 from splitnerf.ops.light import (

@@ -1,8 +1,11 @@
-"""Loads the operator library; :func:`register` gives an operator its fake implementation and its gradient."""
+"""Loads the operator library; :func:`register` gives an operator its fake implementation and its gradient, :func:`front` a
+function of the front page its errors and its leading dimensions."""
 
 from __future__ import annotations
 
 import functools
+import inspect
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -131,3 +134,72 @@ def refuse_gradients(ctx, op: str, **arguments: int) -> None:
     for name, position in arguments.items():
         if ctx.needs_input_grad[position]:
             raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
+
+
+def front(n_rows: int = 1, **own: int) -> Callable[[Callable], Callable]:
+    """Decorates what the front page offers: an argument of a wrong type is named in one line, and rows may be arrays.
+
+    Args:
+        n_rows: The rows of a result for each row of the arguments.
+        own: The arguments that have a row for each point, the first of them always given: name = the number of a row's own
+            dimensions. All may then have the same further dimensions, [2, 5, 3] in place of [10, 3], and so do the results.
+    """
+
+    def decorate(function: Callable) -> Callable:
+        signature = inspect.signature(function)
+        name, names = function.__name__, list(signature.parameters)
+        first, n_own = next(iter(own.items()), (names[0], None))
+        position = names.index(first)
+
+        def in_rows(arguments: dict) -> object:
+            lead = arguments[first].shape[:-n_own]
+
+            def flat(argument: str, x: Tensor) -> Tensor:
+                split = x.dim() - own[argument]
+                if split != len(lead) or x.shape[1:split] != lead[1:]:  # the operator compares the numbers of rows
+                    raise ValueError(f"{name}: {argument} must begin with {list(lead)}, got {list(x.shape)}")
+                return x.flatten(0, split - 1)
+
+            given = {k: _each(functools.partial(flat, k), arguments[k]) for k in own}
+            behind = (n_rows * lead[0], *lead[1:])
+            return _each(lambda x: x.reshape(*behind, *x.shape[1:]), function(**(arguments | given)))
+
+        @functools.wraps(function)
+        def called(*args: object, **kwargs: object) -> object:
+            try:
+                rows = args[position] if position < len(args) else kwargs.get(first)
+                if n_own is None or not isinstance(rows, Tensor) or rows.dim() <= n_own + 1:
+                    return function(*args, **kwargs)
+                bound = signature.bind(*args, **kwargs)
+                bound.apply_defaults()
+                return in_rows(bound.arguments)
+            except (AttributeError, RuntimeError, TypeError) as error:
+                if (wrong := _wrong_type(signature, args, kwargs, str(error))) is None:
+                    raise
+            raise TypeError(f"{name}: {wrong}")
+
+        return called
+
+    return decorate
+
+
+def _wrong_type(signature: inspect.Signature, args: tuple, kwargs: dict, error: str) -> str | None:
+    """What is wrong with the type of an argument, if that is why a call ended in an error, whose words are given."""
+    try:
+        given = signature.bind(*args, **kwargs).arguments
+    except TypeError:  # Python's own words name what is missing or unknown
+        return None
+    for argument, x in given.items():
+        kind = str(signature.parameters[argument].annotation)
+        if kind.startswith("Tensor") and not isinstance(x, Tensor) and (x is not None or "None" not in kind):
+            return f"{argument} must be a tensor, got {type(x).__name__}"
+    found = re.search("a value of type '(.*)' for argument '(.*)' but instead found type '(.*)'", error)
+    return None if found is None else f"{found[2]} must be of type {found[1]}, got {found[3]}"
+
+
+def _each(change: Callable[[Tensor], Tensor], x: object) -> object:
+    """`x` with each tensor changed, where it is one, or a tuple of some."""
+    if isinstance(x, tuple):
+        parts = [_each(change, y) for y in x]
+        return type(x)(*parts) if hasattr(x, "_fields") else tuple(parts)
+    return change(x) if isinstance(x, Tensor) else x

@@ -16,10 +16,11 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops._library import front, lib, refuse_gradients, register
 
 
-def prefilter_light(query_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, light: Tensor) -> Tensor:
+@front(query_dirs=1, roughness=1)
+def prefilter_light(query_dirs: Tensor, roughness: Tensor, *, light_dirs: Tensor, light: Tensor) -> Tensor:
     r"""Estimates gbar(w_s, rho) from light samples that all queries share.
 
     .. math::
@@ -54,6 +55,7 @@ def fibonacci_directions(n: int, generator: torch.Generator | None = None, dtype
     return (lattice[:, :, None] * rotation).sum(1)
 
 
+@front(axes=1, roughness=1)
 def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int = 0) -> Tensor:
     """Directions with density proportional to D(w)(w.axis)+, for lobes so narrow that a shared set would miss them.
 
@@ -231,6 +233,7 @@ def zonal_factors(start: float, n_rows: int) -> Tensor:
     return torch.from_numpy(_core.zonal_factors(start, n_rows)).to(torch.float32)
 
 
+@front()
 def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
     """The product of a matrix with values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
 
@@ -239,6 +242,7 @@ def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
     return lib.sparse_product(*matrix.rows, *matrix.transposed, values)
 
 
+@front(directions=1, roughness=1)
 def light_lookup(
     directions: Tensor, roughness: Tensor, levels: Tensor, sh: Tensor, resolutions: Tensor, nodes: Tensor, zonal: Tensor
 ) -> Tensor:
@@ -289,6 +293,7 @@ register(
 )
 
 
+@front()
 def light_prior(texels: Tensor, level_sizes: Sequence[int]) -> Tensor:
     r"""How far a light is from a smooth and grey one: the sum over its levels of the mean cost of a texel.
 

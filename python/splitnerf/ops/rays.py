@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops._library import front, lib, refuse_gradients, register
 
 
 class PixelList(NamedTuple):
@@ -59,6 +59,7 @@ class EdgeRuns(NamedTuple):
         return cls(empty, empty, empty, torch.empty(0, 3, dtype=torch.uint8, device=device))
 
 
+@front()
 def draw_rays(
     random: Tensor,
     n_near: int,
@@ -92,6 +93,7 @@ def draw_rays(
     return lib.draw_rays(random, n_near, *near, *known, matrices, origins, height, width)
 
 
+@front()
 def read_pixels(
     codes: Tensor, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: EdgeRuns
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -156,8 +158,9 @@ class PackedSamples(NamedTuple):
         return self if n == 0 else PackedSamples(*(F.pad(x, (0, n)) for x in self[:3]), self.offsets)
 
 
+@front()
 def march_rays(
-    rays_o: Tensor, rays_d: Tensor, jitter: Tensor, cells: Tensor, box: float, step: float, max_samples: int = 1024
+    rays_o: Tensor, rays_d: Tensor, jitter: Tensor, cells: Tensor, *, box: float, step: float, max_samples: int = 1024
 ) -> PackedSamples:
     """Steps rays through an occupancy grid and keeps the samples in occupied cells.
 
@@ -176,6 +179,7 @@ def march_rays(
     return PackedSamples(*lib.march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples))
 
 
+@front()
 def surface_weights(
     sdf: Tensor,
     gradient: Tensor,
@@ -267,6 +271,7 @@ class ShadingSubset(NamedTuple):
         return lib.interpolate_backward(weights[:, None], self.first, self.second, self.share, self.shaded)[:, 0]
 
 
+@front()
 def spread_samples(
     weights: Tensor,
     samples: PackedSamples,
@@ -302,6 +307,7 @@ def spread_samples(
     return ShadingSubset(*found)
 
 
+@front()
 def composite(
     weights: Tensor, values: Tensor, offsets: Tensor, opacity: Tensor | None = None, least_opacity: float = 1e-4
 ) -> Tensor:

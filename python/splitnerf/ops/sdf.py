@@ -20,7 +20,7 @@ from torch import Tensor, nn
 from torch.optim.optimizer import register_optimizer_step_post_hook
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops._library import front, lib, refuse_gradients, register
 from splitnerf.ops.rays import PackedSamples
 
 
@@ -71,6 +71,7 @@ class HashGridSpec:
         return self.n_levels, self.base_resolution, self.growth, self.log2_table_size, n_active
 
 
+@front(positions=1)
 def hash_encode(
     positions: Tensor, table: Tensor, spec: HashGridSpec, n_active: int | None = None, stored: Tensor | None = None
 ) -> Tensor:
@@ -282,9 +283,11 @@ class SdfNetwork(NamedTuple):
         return self.table, *weights, *self.spec.arguments(self.n_active), self.box
 
 
+@front(positions=1)
 def sdf_field(
     positions: Tensor,
     table: Tensor,
+    *,
     hidden: Tensor,
     hidden_length: Tensor,
     hidden_bias: Tensor,
@@ -339,11 +342,13 @@ def sdf_field(
     )
 
 
+@front(positions=1)
 def sdf_values(positions: Tensor, network: SdfNetwork) -> Tensor:
     """Signed distances [n] at positions [n, 3], scene units: hash grid and network in one pass."""
     return lib.sdf_values(positions, *network.arguments())
 
 
+@front()
 def sample_rays(
     rays_o: Tensor,
     rays_d: Tensor,

@@ -16,10 +16,11 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, register
+from splitnerf.ops._library import front, lib, register
 
 FRESNEL_MODES = ("exact", "paper", "code")
 QUERIES = ("mean", "reflection")
+SHADED = "normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d".split()
 
 
 @functools.lru_cache(maxsize=8)
@@ -38,6 +39,7 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
     return _brdf_lut(torch.device(device))
 
 
+@front(n_rows=2, normals=1, view_dirs=1, roughness=1)
 def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: str = "mean") -> tuple[Tensor, Tensor]:
     r"""Where shading looks the pre-integrated light up, for the specular and for the diffuse light at once.
 
@@ -69,16 +71,18 @@ def light_queries(normals: Tensor, view_dirs: Tensor, roughness: Tensor, query: 
     return lib.light_queries(normals, view_dirs, roughness, brdf_lut(normals.device), query == "mean")
 
 
+@front(**dict.fromkeys(SHADED, 1), indirect_s=1, indirect_d=1)
 def split_sum_shade(
     normals: Tensor,
     view_dirs: Tensor,
+    *,
     albedo: Tensor,
     roughness: Tensor,
     metallic: Tensor,
     specular: Tensor,
-    diffuse: Tensor | None,
-    occlusion_s: Tensor,
-    occlusion_d: Tensor,
+    diffuse: Tensor | None = None,
+    occlusion_s: Tensor | None = None,
+    occlusion_d: Tensor | None = None,
     fresnel_mode: str = "exact",
     compensate: bool = False,
     indirect_s: Tensor | None = None,
@@ -101,7 +105,7 @@ def split_sum_shade(
         specular: [n, 3] radiance g(d, rho); d from :func:`light_queries`. Or, with ``diffuse`` None, [2 n, 3]: what
             the light answers to :func:`light_queries`, g(d, rho) of all points and then g(n, 1) of all.
         diffuse: [n, 3] radiance g(n, 1), or None.
-        occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
+        occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open; None: open everywhere.
         fresnel_mode: The form of the Fresnel term: ``exact`` (above), ``paper`` or ``code``. The last two mix the
             materials' reflectances, ``F0 = 0.04 (1 - m) + m albedo``, and apply the term twice, as published.
         compensate: Whether to compensate for multiple scattering: each lobe's ``E [1 + F0 (1/(F1 + F2) - 1)]`` with F0
@@ -116,6 +120,10 @@ def split_sum_shade(
     """
     if fresnel_mode not in FRESNEL_MODES:
         raise ValueError(f"split_sum_shade: fresnel_mode must be one of {FRESNEL_MODES}, got {fresnel_mode!r}")
+    if occlusion_s is None:
+        occlusion_s = torch.ones_like(roughness if occlusion_d is None else occlusion_d)
+    if occlusion_d is None:
+        occlusion_d = torch.ones_like(occlusion_s)
     points = normals, view_dirs, albedo, roughness, metallic
     light = specular, diffuse, occlusion_s, occlusion_d
     options = brdf_lut(normals.device), FRESNEL_MODES.index(fresnel_mode), compensate
@@ -127,11 +135,7 @@ register(
     fake=lambda normals, *rest: (normals.new_empty(2 * len(normals), 3), normals.new_empty(2 * len(normals), 1)),
     gradients="normals roughness",
 )
-register(
-    "split_sum_shade",
-    fake=lambda normals, *rest: normals.new_empty(normals.shape),
-    gradients="normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d",
-)
+register("split_sum_shade", fake=lambda normals, *rest: normals.new_empty(normals.shape), gradients=" ".join(SHADED))
 
 
 class LightSums(NamedTuple):
@@ -151,6 +155,7 @@ class LightSums(NamedTuple):
     dielectric: Tensor
 
 
+@front(normals=1, view_dirs=1, roughness=1, light_dirs=2, pdf=1, radiance=2)
 def monte_carlo_light(
     normals: Tensor, view_dirs: Tensor, roughness: Tensor, light_dirs: Tensor, pdf: Tensor, radiance: Tensor
 ) -> LightSums:
@@ -168,6 +173,7 @@ def monte_carlo_light(
     return LightSums(*lib.monte_carlo_light(normals, view_dirs, roughness, light_dirs, pdf, radiance).unbind(1))
 
 
+@front(normals=1, view_dirs=1, roughness=1, visible=1, sent=2)
 def summed_light(
     normals: Tensor,
     view_dirs: Tensor,
@@ -199,9 +205,11 @@ def summed_light(
     return LightSums(*sums.unbind(1))
 
 
+@front(normals=1, view_dirs=1, albedo=1, roughness=1, metallic=1, sums=1)
 def shade_sums(
     normals: Tensor,
     view_dirs: Tensor,
+    *,
     albedo: Tensor,
     roughness: Tensor,
     metallic: Tensor,
@@ -234,9 +242,11 @@ def shade_sums(
     return lib.shade_sums(normals, view_dirs, albedo, roughness, metallic, stacked, table, compensate, None, None)
 
 
+@front(normals=1, view_dirs=1, albedo=1, roughness=1, metallic=1, split=1, share=0, visible=1, sent=2)
 def summed_correction(
     normals: Tensor,
     view_dirs: Tensor,
+    *,
     albedo: Tensor,
     roughness: Tensor,
     metallic: Tensor,
@@ -283,6 +293,7 @@ register(
 )
 
 
+@front()
 def linear_to_srgb(linear: Tensor) -> Tensor:
     """Encodes linear values of any shape. Values below 0 count as 0; values above 1 are not clipped. Differentiable
     once.
@@ -294,6 +305,7 @@ def linear_to_srgb(linear: Tensor) -> Tensor:
     return lib.linear_to_srgb(linear)
 
 
+@front()
 def srgb_to_linear(srgb: Tensor) -> Tensor:
     """Decodes sRGB values >= 0 of any shape. Values above 1 are not clipped. No gradient.
 

@@ -16,18 +16,19 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from splitnerf.ops._library import lib, refuse_gradients, register
+from splitnerf.ops._library import front, lib, refuse_gradients, register
 from splitnerf.ops.sdf import TableCopy
 
 
+@front()
 def pixel_losses(
     mean: Tensor,
     opacity: Tensor,
+    *,
     target: Tensor,
     background: Tensor,
     whole: Tensor | None = None,
     exposure: Tensor | None = None,
-    *,
     linear: bool = True,
 ) -> Tensor:
     """Mean squared sRGB error of pixels against photos over the same background, and the cross entropy with their
@@ -56,6 +57,7 @@ def pixel_losses(
     return lib.pixel_losses(mean, opacity, target, background, whole, exposure, linear)
 
 
+@front()
 def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tensor:
     """The eikonal loss and the smoothness loss of a distance field's gradients.
 
@@ -79,6 +81,7 @@ def gradient_losses(gradients: Tensor, weights: Tensor, beside: Tensor) -> Tenso
     return lib.gradient_losses(gradients, weights, beside)[0]
 
 
+@front()
 def quadratic_entropy(x: Tensor) -> Tensor:
     r"""The entropy of points, over all n^2 pairs of them, i = j included.
 

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from splitnerf import _core
-from splitnerf.ops._library import lib, register
+from splitnerf.ops._library import front, lib, register
 
 
 class MeshScene:
@@ -77,14 +77,15 @@ class MeshScene:
         return torch.from_numpy(self._scene.trace_visibility(*rays, t_far))
 
 
+@front(positions=1, normals=1, lobe_dirs=1, roughness=1)
 def occlusion_factors(
     scene: MeshScene,
     positions: Tensor,
     normals: Tensor,
+    *,
     lobe_dirs: Tensor,
     roughness: Tensor,
     environment: Tensor,
-    *,
     n_diffuse_rays: int = 64,
     n_specular_rays: int = 64,
     offset: float = 0.0125,
@@ -142,6 +143,7 @@ GRID_LEVELS = 4  # levels of the search; the last has 8 times the radius of the 
 RADIUS_IN_SPACINGS = 1.5
 
 
+@front()
 def visibility_bits(
     scene: MeshScene,
     positions: Tensor,
@@ -225,10 +227,12 @@ class VisibilityCache:
         return sum(t.numel() * t.element_size() for t in tensors)
 
 
+@front(positions=1, normals=1, lobe_dirs=1, roughness=1)
 def cached_occlusion(
     cache: VisibilityCache,
     positions: Tensor,
     normals: Tensor,
+    *,
     lobe_dirs: Tensor,
     roughness: Tensor,
     light: Tensor,
@@ -272,6 +276,7 @@ def cached_occlusion(
     return (o_d, o_s, None, None) if radiance is None else (o_d, o_s, i_d, i_s)
 
 
+@front(positions=1, normals=1)
 def cached_visibility(
     cache: VisibilityCache, positions: Tensor, normals: Tensor, radiance: Tensor | None = None
 ) -> tuple[Tensor, Tensor | None]:
@@ -356,17 +361,18 @@ class IncomingLight(NamedTuple):
     sent: Tensor
 
 
+@front(positions=1, geometric_normals=1, normals=1, view_dirs=1, albedo=1, roughness=1, metallic=1)
 def incoming_light(
     surface: TexturedSurface,
     environment: Tensor,
     positions: Tensor,
+    *,
     geometric_normals: Tensor,
     normals: Tensor,
     view_dirs: Tensor,
     albedo: Tensor,
     roughness: Tensor,
     metallic: Tensor,
-    *,
     n_directions: int,
     max_bounces: int = 3,
     clamp_indirect: float = 0.0,

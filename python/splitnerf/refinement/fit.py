@@ -261,12 +261,12 @@ class Refinement:
             surface,
             around,
             samples.positions,
-            samples.geometric,
-            m.normals.detach(),
-            samples.view_dirs,
-            m.albedo.detach(),
-            m.roughness.detach(),
-            m.metallic.detach(),
+            geometric_normals=samples.geometric,
+            normals=m.normals.detach(),
+            view_dirs=samples.view_dirs,
+            albedo=m.albedo.detach(),
+            roughness=m.roughness.detach(),
+            metallic=m.metallic.detach(),
             n_directions=s.directions,
             max_bounces=BOUNCES,
             clamp_indirect=CLAMP_INDIRECT,
@@ -279,7 +279,8 @@ class Refinement:
         drawn = (m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf)
         white = white_sums(m.normals, samples.view_dirs, m.roughness)
         sums = centred(monte_carlo_light(*drawn, radiance), monte_carlo_light(*drawn, torch.ones_like(sky)), white)
-        colours = shade_sums(m.normals, samples.view_dirs, m.albedo, m.roughness, m.metallic, sums, compensate=True)
+        material = {"albedo": m.albedo, "roughness": m.roughness, "metallic": m.metallic}
+        colours = shade_sums(m.normals, samples.view_dirs, **material, sums=sums, compensate=True)
         return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
 
     def observe(self, surface: TexturedSurface, draws: Draws, random: np.random.Generator, seed: int) -> Observed:

@@ -28,6 +28,7 @@ from splitnerf.fields.surface import SdfSample
 from splitnerf.ops import HashGridSpec, MeshScene, cached_occlusion, light_queries, split_sum_shade, summed_correction
 
 ENVIRONMENT_ROWS = 128  # of the image of a trained light
+MATERIAL = "albedo", "roughness", "metallic"
 N_FEATURES = 2  # of a level of the hash grid
 N_OUTPUTS = 13  # of the surface's network, the distance among them
 HEAD_LAYERS = 2  # hidden layers of the networks of material and occlusion
@@ -233,8 +234,18 @@ class SceneModel(nn.Module):
         lobe_dirs, facing = queries[0].chunk(2)
         surface = on_surface(positions, normals, outputs[:, 0])
         o_d, o_s, i_d, i_s = self.occlusion_at(inputs, surface, facing, lobe_dirs, roughness, segments)
-        options = c.shading.fresnel, c.shading.compensate
-        shaded = split_sum_shade(normals, view_dirs, *materials, light(*queries), None, o_s, o_d, *options, i_s, i_d)
+        shaded = split_sum_shade(
+            normals,
+            view_dirs,
+            **dict(zip(MATERIAL, materials)),
+            specular=light(*queries),
+            occlusion_s=o_s,
+            occlusion_d=o_d,
+            fresnel_mode=c.shading.fresnel,
+            compensate=c.shading.compensate,
+            indirect_s=i_s,
+            indirect_d=i_d,
+        )
         return ShadedPoints(shaded, normals, *materials, o_d, o_s, facing, lobe_dirs, surface)
 
     def quadrature_correction(
@@ -269,11 +280,23 @@ class SceneModel(nn.Module):
         middle, half = self.cells.summed_from, 0.5 * SUMMED_BAND
         at, share = wide_lobes(candidates, points.roughness.detach(), middle - half, middle + half, n_candidates)
         places = (x.index_select(0, at) for x in (points.on_surface, points.facing.detach()))
-        incoming = light.cells.solid_angles, light.cells.radiance, *self.bits.visibility(*places)
-        shaded = points.normals, view_dirs, points.albedo, points.roughness, points.metallic, points.radiance
-        corrected = (x.index_select(0, at) for x in shaded)
-        directions, compensate = self.bits.cache.directions, self.config.shading.compensate
-        return at, summed_correction(*corrected, share, directions, *incoming, compensate)
+        visible, sent = self.bits.visibility(*places)
+        normals, views, *corrected = (
+            x.index_select(0, at)
+            for x in (points.normals, view_dirs, points.albedo, points.roughness, points.metallic, points.radiance)
+        )
+        return at, summed_correction(
+            normals,
+            views,
+            **dict(zip((*MATERIAL, "split"), corrected)),
+            share=share,
+            directions=self.bits.cache.directions,
+            solid_angles=light.cells.solid_angles,
+            radiance=light.cells.radiance,
+            visible=visible,
+            sent=sent,
+            compensate=self.config.shading.compensate,
+        )
 
     def use_turns(self, turns: Tensor | None) -> None:
         """Sets the rotations [views, 3, 3] of the photos' light; None: it stands still. That of the cached occlusion is
@@ -343,19 +366,21 @@ class SceneModel(nn.Module):
         g = light if self.cells.turns is None else mean_over(light, self.cells.turns)
         x, n = bits.cache.vertices, bits.cache.normals
         materials = [torch.cat(parts) for parts in zip(*map(self.materials_at, x.split(chunk)))]
-        o_d, _, i_d, _ = cached_occlusion(bits.cache, x, n, n, materials[1], bits.light, bits.radiance)
+        o_d, _, i_d, _ = cached_occlusion(
+            bits.cache, x, n, lobe_dirs=n, roughness=materials[1], light=bits.light, radiance=bits.radiance
+        )
         diffuse = o_d * g(n, torch.ones_like(n[:, :1])) + (0.0 if i_d is None else i_d)
         before = x.new_zeros(1, 3) if bits.radiance is None else F.pad(bits.radiance, (0, 0, 0, 1))
         blur = lobe_roughness(4.0 * math.pi / len(bits.light)) ** 4  # a ray stands for all of its cell
         parts = [x.new_zeros(0, 3)]
         for vertices, directions, mirrored, facing in zip(*(part.split(chunk) for part in bits.emitters)):
             normals, views = n[vertices], -bits.cache.directions[directions]
-            albedo, roughness, metallic = (part[vertices] for part in materials)
+            material = {name: part[vertices] for name, part in zip(MATERIAL, materials)}
+            roughness = material["roughness"]
             lobes = light_queries(normals, views, roughness)[0][: len(views)]
             sky = g(lobes, (roughness**4 + blur).sqrt().sqrt())
             seen = before[mirrored.clamp(max=len(before) - 1)]
-            specular, one = torch.where(mirrored[:, None] < 0, sky, seen), torch.ones_like(roughness)
-            light_here = specular, diffuse[vertices], one, one
-            points = normals, views, albedo, roughness, metallic
-            parts.append(split_sum_shade(*points, *light_here, c.fresnel, c.compensate) * facing)
+            light_here = {"specular": torch.where(mirrored[:, None] < 0, sky, seen), "diffuse": diffuse[vertices]}
+            how = {"fresnel_mode": c.fresnel, "compensate": c.compensate}
+            parts.append(split_sum_shade(normals, views, **material, **light_here, **how) * facing)
         bits.set_radiance(torch.cat(parts))

@@ -166,7 +166,9 @@ def find_samples(
     c, s = model.config, model.s_value if s is None else s
     step = sample_step(c, s)
     if c.sampling.min_weight == 0:
-        packed = march_rays(rays_o, rays_d, jitter, cells, c.constants.box, step, MAX_SAMPLES_PER_RAY)
+        packed = march_rays(
+            rays_o, rays_d, jitter, cells, box=c.constants.box, step=step, max_samples=MAX_SAMPLES_PER_RAY
+        )
         evaluated, n_found = packed.offsets.diff(), packed.offsets[-1]
     else:
         packed, evaluated, n_found = sample_rays(

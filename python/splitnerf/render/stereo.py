@@ -181,7 +181,7 @@ def _swept(
 
 def _limits(rays_o: Tensor, rays_d: Tensor, cells: Tensor, box: float) -> tuple[Tensor, Tensor]:
     """Where each ray enters the occupied cells first and leaves them last, [n] each; 0 for rays that miss them."""
-    packed = march_rays(rays_o, rays_d, torch.full_like(rays_o[:, 0], 0.5), cells, box, STEP)
+    packed = march_rays(rays_o, rays_d, torch.full_like(rays_o[:, 0], 0.5), cells, box=box, step=STEP)
     missed = packed.offsets.diff() == 0
     ends = packed.offsets[1:].clamp(min=1) - 1
     middles = torch.cat([packed.middles, rays_o.new_zeros(1)])  # none at all is no error

@@ -119,7 +119,13 @@ def loss_terms(
     terms.add(
         {"colour": CHANNELS * w.colour_weight, "mask": kept * w.mask_weight or None},
         pixel_losses(
-            ray.mean, ray.opacity, batch.target, batch.background, batch.whole, batch.exposure, linear=ray.linear
+            ray.mean,
+            ray.opacity,
+            target=batch.target,
+            background=batch.background,
+            whole=batch.whole,
+            exposure=batch.exposure,
+            linear=ray.linear,
         ),
     )
     terms.add(
@@ -170,7 +176,8 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     g = light(queried, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
     parts = zip(directions.chunk(n_sets), shared.chunk(n_sets))
-    sums = torch.stack([prefilter_light(queries[n_narrow:], roughness[n_narrow:], *part) for part in parts])
+    wide = queries[n_narrow:], roughness[n_narrow:]
+    sums = torch.stack([prefilter_light(*wide, light_dirs=w, light=sent) for w, sent in parts])
     error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums.mean(0)])
     if n_sets == 2:
         noise = ((sums[0] - sums[1]) / 2).square().sum().item()
@@ -295,9 +302,9 @@ def occlusion_loss(
             scene,
             ray.positions[chosen] - normals * ray.sdf[chosen, None],
             normals,
-            ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
-            ray.points.roughness[chosen],
-            environment,
+            lobe_dirs=ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
+            roughness=ray.points.roughness[chosen],
+            environment=environment,
             n_diffuse_rays=n_rays,
             n_specular_rays=n_rays,
             offset=c.constants.occlusion_offset,

@@ -58,7 +58,9 @@ class Truth:
         roughness = torch.full((len(axes), 1), rho)
         if rho >= QUADRATURE_FROM:
             areas = self.areas.expand(-1, 3).contiguous()
-            lit, whole = (prefilter_light(axes, roughness, self.directions, part) for part in (self.lit, areas))
+            lit, whole = (
+                prefilter_light(axes, roughness, light_dirs=self.directions, light=part) for part in (self.lit, areas)
+            )
             return lit / whole
         means = []
         for i, part in enumerate(axes.split(max(1, TRUTH_CHUNK // self.n))):
@@ -73,7 +75,7 @@ def uniform(light: MapLight, n: int, with_queries: bool) -> Estimate:
     def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
         directions = F.normalize(torch.randn(n, 3), dim=1)
         directions = torch.cat([directions, axes]) if with_queries else directions
-        return prefilter_light(axes, roughness, directions, light(directions))
+        return prefilter_light(axes, roughness, light_dirs=directions, light=light(directions))
 
     return estimate
 
@@ -81,7 +83,7 @@ def uniform(light: MapLight, n: int, with_queries: bool) -> Estimate:
 def fibonacci(light: MapLight, n: int) -> Estimate:
     def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
         directions = fibonacci_directions(n)
-        return prefilter_light(axes, roughness, directions, light(directions))
+        return prefilter_light(axes, roughness, light_dirs=directions, light=light(directions))
 
     return estimate
 

@@ -109,6 +109,7 @@ def light_panels(model: SceneModel, height: int = 64, n_samples: int = 8192) -> 
         g = model.light.panorama(height, roughness)
         g_bar = g
         if roughness > 0:
-            g_bar = prefilter_light(queries, torch.full_like(queries[:, :1], roughness), sources, light).view_as(g)
+            asked = queries, torch.full_like(queries[:, :1], roughness)
+            g_bar = prefilter_light(*asked, light_dirs=sources, light=light).view_as(g)
         panels.append({"roughness": roughness, "g": g.cpu().numpy(), "g_bar": g_bar.cpu().numpy()})
     return panels
