@@ -13,6 +13,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import torch
 import trimesh
 
@@ -29,8 +30,8 @@ from splitnerf.devices import same_bits
 from splitnerf.errors import InputError, note, note_once
 from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
 from splitnerf.export.meshing import EmptyMesh
-from splitnerf.export.scene import Exported, write_assets
-from splitnerf.files import atomic_path, is_own, locked
+from splitnerf.export.scene import Exported, Placing, write_assets, write_delivered
+from splitnerf.files import is_own, locked
 from splitnerf.plugins import installed
 from splitnerf.refinement.fit import FitSettings
 from splitnerf.refinement.refine import (
@@ -39,6 +40,7 @@ from splitnerf.refinement.refine import (
     TRAINED,
     OtherState,
     forget_state,
+    occlusion_texture,
     refine_folder,
     refinement_summary,
 )
@@ -47,12 +49,14 @@ from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
 from splitnerf.run_folder import (
     ORIGIN,
+    asset_name,
     check_results,
     check_run,
     clear_run,
     discard_refinement,
     is_refined,
     move_assets,
+    own_results,
     refuse_no_run,
     write_data_of,
 )
@@ -184,7 +188,7 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
         clock = time.monotonic()
         discard_refinement(run)
         try:
-            mesh = write_assets(run, model, dataset.box_from_world, Cameras.of(dataset)).mesh
+            mesh = write_assets(run, model, dataset.box_from_world, Cameras.of(dataset), name=asset_name(run)).mesh
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock
@@ -315,9 +319,11 @@ def export_run(
     n_faces: int | None = None,
     texture_size: int | None = None,
     resolution: int | None = None,
+    placing: Placing = Placing(),
     overwrite: bool = False,
 ) -> Exported:
-    """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`.
+    """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`: what the run delivers;
+    with a size, or into the run, what was trained. origin.json says where an asset is that is not as the data have it.
 
     Raises:
         InputError: The run cannot be used, files would be replaced (unless ``overwrite``), or a format needs a package
@@ -328,18 +334,45 @@ def export_run(
         raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
     refuse_no_run(run)
     check_results(out, run, overwrite=overwrite)
-    model, _, content = load_run(run)
-    with locked(out):
-        if (run / ORIGIN).is_file() and out.resolve() != run.resolve():
-            with atomic_path(out / ORIGIN) as temporary:
-                shutil.copyfile(run / ORIGIN, temporary)
-        return write_assets(
-            out,
-            model,
-            content["box_from_world"].numpy(),
-            Cameras(**content["cameras"]),
-            formats=formats,
-            resolution=resolution,
-            n_faces=n_faces,
-            texture_size=texture_size,
+    own = own_results(out, run)
+    if own and placing.moves:
+        raise InputError(
+            f"{out}: the run's own asset stands where the data are; for --pivot, --scale and --height give another --out"
         )
+    anew = any(size is not None for size in (n_faces, texture_size, resolution))
+    asset = read_asset(run / "mesh.glb") if is_refined(run) and not (own or anew) else None
+    if asset is None:
+        model, _, content = load_run(run)
+    with locked(out):
+        if asset is not None:
+            asset.name = asset_name(run)
+            exported = write_delivered(run, out, formats, asset, occlusion_texture(asset), placing)
+        else:
+            exported = write_assets(
+                out,
+                model,
+                content["box_from_world"].numpy(),
+                Cameras(**content["cameras"]),
+                formats=formats,
+                resolution=resolution,
+                n_faces=n_faces,
+                texture_size=texture_size,
+                name=asset_name(run),
+                placing=placing,
+            )
+        if out.resolve() != run.resolve():
+            write_origin(out, run, exported)
+    return exported
+
+
+def write_origin(out: Path, run: Path, exported: Exported) -> None:
+    """Writes where the data's world is in the files of an export, if it is not as they are."""
+    known = np.array(read_json(run / ORIGIN, "origin")["origin"] if (run / ORIGIN).is_file() else [0.0, 0.0, 0.0])
+    origin, meaning = (
+        known + exported.origin,
+        "divide positions by the scale and add the origin to get those of the data",
+    )
+    if origin.any() or exported.scale != 1:
+        write_json(out / ORIGIN, {"origin": origin.tolist(), "scale": exported.scale, "meaning": meaning})
+    else:
+        (out / ORIGIN).unlink(missing_ok=True)

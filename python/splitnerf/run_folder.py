@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 from splitnerf.config import Config
@@ -52,13 +53,23 @@ def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
     """Checks that results of a run can be written into a folder; its own folders hold nothing else. Raises InputError
     where they would replace a data set, what belongs to another run or, unless ``overwrite``, other files."""
     refuse_data(out)
-    if out.resolve() in [(run / name).resolve() for name in (".", TRAINED, REFINED)]:
+    if own_results(out, run):
         return
     if (out / "checkpoint.pt").exists():
         raise InputError(f"{out}: holds another run, whose results would be replaced; give another --out")
     present = [name for name in (*RUN_FILES, *EXPORTED) if (out / name).exists()]
     if present and not overwrite:
         raise InputError(f"{out / present[0]}: would be replaced; give another --out, or --overwrite")
+
+
+def own_results(out: Path, run: Path) -> bool:
+    """Whether a folder is one of a run's own, for its results."""
+    return out.resolve() in [(run / name).resolve() for name in (".", TRAINED, REFINED)]
+
+
+def asset_name(run: Path) -> str:
+    """What the mesh, the material and the images of a run are called: as its folder."""
+    return re.sub(r"[^\w.-]+", "_", run.resolve().name) or "object"
 
 
 def write_data_of(run: Path, dataset: Dataset) -> None:

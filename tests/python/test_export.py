@@ -18,6 +18,7 @@ from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material, vertex_tangents
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, read_image, read_radiance
+from splitnerf.data.json_files import read_json
 from splitnerf.export.scene import write_assets, write_environment, write_mesh_ply
 from splitnerf.export.writers import write_glb, write_obj, write_usdz
 from splitnerf.fields import Light
@@ -99,7 +100,10 @@ def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     assert pbr["baseColorFactor"] == pytest.approx([0.5, 0.25, 1.0, 1.0])
     assert (pbr["roughnessFactor"], pbr["metallicFactor"]) == pytest.approx((0.9, 0.8))
     assert material["occlusionTexture"]["index"] == pbr["metallicRoughnessTexture"]["index"]
-    assert len(document["images"]) == 3
+    assert {image["name"] for image in document["images"]} == {
+        f"{asset.name}_{k}" for k in ("basecolor", "orm", "normal")
+    }
+    assert {part[0]["name"] for part in (document[k] for k in ("nodes", "meshes", "materials"))} == {asset.name}
     stored = asset.materials[0]
     albedo = image_of(document, binary, pbr["baseColorTexture"]["index"]) / 255
     assert albedo == pytest.approx(linear_to_srgb(stored.albedo_texture), abs=0.51 / 255)
@@ -226,6 +230,25 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     assert (outward > 0).all() and "TANGENT" in arrays and len(document["images"]) == 3
 
 
+def test_export_stands_the_asset_on_its_foot_at_its_height(tmp_path, run, capsys):
+    """The sphere's foot is the origin of all files, and origin.json takes them back to the data."""
+    small = ["--faces", "1000", "--texture-size", "64", "--pivot", "foot", "--height", "0.25"]
+    assert main(["export", str(run), "--out", str(tmp_path / "out"), *small]) == DONE
+    assert "cameras of the data no longer fit" in capsys.readouterr().out
+    document, arrays, _ = parse_glb(tmp_path / "out" / "mesh.glb")
+    low, high = arrays["POSITION"].min(axis=0), arrays["POSITION"].max(axis=0)
+    assert [low[1], high[1], low[0] + high[0], low[2] + high[2]] == pytest.approx([0, 0.25, 0, 0], abs=1e-6)
+    assert document["meshes"][0]["name"] == "run"
+    full = trimesh.load(tmp_path / "out" / "mesh.ply", process=False)
+    placed = read_json(tmp_path / "out" / "origin.json", "origin")
+    back = full.vertices / placed["scale"] + placed["origin"]
+    assert back.mean(axis=0) == pytest.approx([1, 0, -2], abs=0.05) and np.ptp(back) > 0
+    assert np.ptp(full.vertices[:, 2]) == pytest.approx(0.25, rel=0.02)
+    again = ["--out", str(tmp_path / "out"), "--formats", "ply", "--overwrite"]
+    assert main(["export", str(run), *again]) == DONE
+    assert not (tmp_path / "out" / "origin.json").exists()
+
+
 class ThreeLamps(Light):
     """A red lamp along +x, a green one along +y, a blue one along +z, ten degrees wide, over a dim sky."""
 
@@ -269,11 +292,15 @@ def test_export_goes_into_the_run_and_ply_needs_no_textures(run):
         (["--faces", "-5"], "--faces must be 0 or at least 100, got -5"),
         (["--texture-size", "4"], r"--texture-size must be in \[8, 8192\], got 4"),
         (["--resolution", "2"], r"--resolution must be in \[8, 4096\], got 2"),
+        (["--scale", "0"], "--scale must lie between 1e-6 and 1e6, got 0"),
+        (["--height", "nan"], "--height must lie between 1e-6 and 1e6, got nan"),
+        (["--pivot", "foot", "--out", "RUN"], "the run's own asset stands where the data are"),
         ([], "no such run"),
     ],
 )
 def test_bad_options_are_one_line_and_write_nothing(tmp_path, run, options, message, capsys):
     run = tmp_path / "none" if message == "no such run" else run
+    options = [str(run) if word == "RUN" else word for word in options]
     assert main(["export", str(run), "--out", str(tmp_path / "out"), *options]) == BAD_INPUT
     error = capsys.readouterr().err
     assert len(error.splitlines()) == 1 and re.search(message, error)

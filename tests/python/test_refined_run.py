@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 from painted_ball import sky, with_textures
 from splitnerf import pipeline, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
@@ -63,7 +64,7 @@ def test_a_run_delivers_what_was_fitted_and_keeps_what_was_trained(run):
 
 def test_the_export_says_at_once_what_it_does(run, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
-    assert main(["export", str(run), "--out", str(tmp_path), "--formats", "glb"]) == DONE
+    assert main(["export", str(run), "--out", str(tmp_path), "--texture-size", "32"]) == DONE
     said = [line.split("export, ")[1] for line in capsys.readouterr().err.splitlines() if "export, " in line]
     assert said == ["surface on a grid of 32^3", "fewer faces", "texture coordinates", "textures", "files"]
 
@@ -100,7 +101,7 @@ def test_another_run_in_the_folder_leaves_nothing_of_the_refinement(run, data, t
     assert train(data, again, "--steps", "12", "--overwrite") == DONE
     assert not (again / "trained").exists() and not any((again / name).exists() for name in DELIVERED[3:])
     # And so does a run that goes on without.
-    again = shutil.copytree(run, tmp_path / "on")
+    again = shutil.copytree(run, tmp_path / "on" / "run")
     assert main(["train", str(data), "--out", str(again), "--resume", "--no-refine"]) == DONE
     assert not (again / "trained").exists() and not (again / "refinement.json").exists()
     assert bytes_of(again, "mesh.glb") == bytes_of(run / "trained", "mesh.glb")
@@ -128,6 +129,20 @@ def test_an_export_does_not_replace_what_the_refinement_fitted(run, tmp_path, ca
     assert read_asset(run / "trained" / "mesh.glb").materials[0].albedo_texture.shape == (32, 32, 3)
 
 
+def test_an_export_elsewhere_holds_what_the_refinement_fitted(run, tmp_path, capsys):
+    """Twice as large, its names and its light as the run's."""
+    assert main(["export", str(run), "--out", str(tmp_path / "out"), "--scale", "2"]) == DONE
+    fitted, out = read_asset(run / "mesh.glb"), read_asset(tmp_path / "out" / "mesh.glb")
+    assert fitted.name == out.name == run.name
+    assert out.vertices == pytest.approx(2 * fitted.vertices, abs=1e-6)
+    for name in ("albedo_texture", "roughness_metallic_texture", "normal_texture"):
+        assert np.array_equal(getattr(out.materials[0], name), getattr(fitted.materials[0], name))
+    assert bytes_of(tmp_path / "out", *DELIVERED[1:3]) == bytes_of(run, *DELIVERED[1:3])
+    ours, full = (trimesh.load(folder / "mesh.ply", process=False) for folder in (run, tmp_path / "out"))
+    assert full.vertices == pytest.approx(2 * ours.vertices, abs=1e-5)
+    assert np.array_equal(full.visual.vertex_colors, ours.visual.vertex_colors)
+
+
 # ---- its end, and going on ----
 
 
@@ -147,7 +162,7 @@ def stop_after(monkeypatch, sweeps: int) -> None:
 def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_another(
     run, data, tmp_path, capsys, monkeypatch
 ):
-    halves = tmp_path / "halves"
+    halves = tmp_path / "run"  # the files hold its name
     with monkeypatch.context() as patch:
         stop_after(patch, 1)
         assert train(data, halves, "--steps", "25", "--deterministic", *REFINED) == INTERRUPTED

@@ -388,13 +388,13 @@ def test_kills_end_with_the_bits_of_an_unbroken_run(data, tmp_path, n_kills):
         return content | {"seconds": 0} | {name: (run / name).read_bytes() for name in FITTED}
 
     started("info", "--settings").join()
-    whole, began = started(*words, str(tmp_path / "whole")), time.monotonic()
+    whole, began = started(*words, str(tmp_path / "whole" / "run")), time.monotonic()
     whole.join()
     seconds, random, runs, kills = time.monotonic() - began, Random(0), 0, 0
     assert whole.exitcode == DONE
-    expected = state(tmp_path / "whole")
+    expected = state(tmp_path / "whole" / "run")
     while kills < n_kills:
-        runs, run = runs + 1, tmp_path / f"killed_{runs}"
+        runs, run = runs + 1, tmp_path / f"killed_{runs}" / "run"  # the files hold its name
         while (process := started(*words, str(run))).join(random.uniform(0.1, 1.0) * seconds) or process.is_alive():
             process.kill()
             process.join()

@@ -15,13 +15,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "export",
         help="write a run's textured mesh and light",
-        description="Writes what RUN trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
+        description="Writes what RUN delivers or, with a size, what it trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
         "the walls of cavities are dropped; what no photo shows is a cap between its edges.",
         epilog=examples(
             "splitnerf export runs/data --formats glb,obj --out asset",
             "splitnerf export runs/data --faces 20000 --texture-size 1024 --out small",
+            "splitnerf export runs/data --pivot foot --height 0.25 --out vase",
         ),
     )
     parser.add_argument("run", type=Path, metavar="RUN")
@@ -35,13 +36,22 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
     ):
         parser.add_argument(option, type=kind, default=default, metavar=name, help=text)
+    parser.add_argument(
+        "--pivot",
+        choices=["data", "foot"],
+        default="data",
+        help="the asset's origin: that of the data (default), or its foot, the middle of its lowest height",
+    )
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--scale", type=float, default=1.0, metavar="S", help="units of the files for one of the data's")
+    size.add_argument("--height", type=float, metavar="H", help="how high the asset is in the files, in their units")
     parser.add_argument("--overwrite", action="store_true", help="replace an earlier export in --out")
     parser.set_defaults(execute=run)
 
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config import FIELDS
-    from splitnerf.export.scene import FORMATS
+    from splitnerf.export.scene import FORMATS, Placing
     from splitnerf.pipeline import export_run
     from splitnerf.run_folder import export_folder
 
@@ -55,6 +65,10 @@ def run(args: argparse.Namespace) -> int:
         value, limits = getattr(args, option), FIELDS[f"export.{option}"].metadata["limits"]
         if value is not None and not limits.allow(value):
             raise InputError(f"--{option.replace('_', '-')} must be {limits}, got {value}")
+    for option in ("scale", "height"):
+        value = getattr(args, option)
+        if value is not None and not 1e-6 <= value <= 1e6:
+            raise InputError(f"--{option} must lie between 1e-6 and 1e6, got {value:g}")
     out = args.out or export_folder(args.run)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
@@ -65,10 +79,16 @@ def run(args: argparse.Namespace) -> int:
         n_faces=args.faces,
         texture_size=args.texture_size,
         resolution=args.resolution,
+        placing=Placing(args.pivot == "foot", args.scale, args.height),
         overwrite=args.overwrite,
     )
     closed = "watertight" if exported.watertight else "not watertight"
     dropped = f"{exported.n_dropped} floating or enclosed component{'' if exported.n_dropped == 1 else 's'} dropped"
     print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {dropped}")
+    if exported.origin.any() or exported.scale != 1:
+        where = ", ".join(f"{x:.6g}" for x in exported.origin)
+        print(
+            f"placed: origin at ({where}) of the data, times {exported.scale:.6g}; cameras of the data no longer fit it"
+        )
     print(f"results: {', '.join(str(out / f'mesh.{name}') for name in formats)}, {out / 'environment.exr'}")
     return DONE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,10 @@ import torch
 import trimesh
 from torch import Tensor
 
+from splitnerf.data.asset import Asset
 from splitnerf.data.images import linear_to_srgb, to_uint8, write_image
 from splitnerf.data.normalisation import transform_points
+from splitnerf.data.truth import read_mesh
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_closed
 from splitnerf.export.surface import Surface, surface_materials
@@ -30,13 +33,76 @@ FORMATS = ("glb", "ply", "obj", "usdz")
 @dataclass(frozen=True)
 class Exported:
     """What was exported: the mesh before decimation, in the data's world; the number of faces of the textured mesh
-    (that of `mesh` where no format has textures) and whether it is closed; and the number of floating or enclosed
-    components that were removed."""
+    (that of `mesh` where no format has textures) and whether it is closed; the number of floating or enclosed components
+    that were removed; and the point [3] of the data's world that is the origin of the files, and their units for one of it."""
 
     mesh: trimesh.Trimesh
     n_faces: int
     watertight: bool
     n_dropped: int
+    origin: np.ndarray
+    scale: float
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where files have the asset: its foot, the middle of its lowest height, at the origin, or as the data have it; and their
+    units for one of the data's, or those of its whole height."""
+
+    foot: bool = False
+    scale: float = 1.0
+    height: float | None = None
+
+    @property
+    def moves(self) -> bool:
+        return self != Placing()
+
+    def of(self, vertices: np.ndarray) -> tuple[np.ndarray, float]:
+        """The origin [3] and the scale for an asset with vertices [n, 3] in the data's world."""
+        low, high = (end.astype(np.float64) for end in (vertices.min(axis=0), vertices.max(axis=0)))
+        origin = np.array([*(0.5 * (low + high))[:2], low[2]]) if self.foot else np.zeros(3)
+        return origin, self.scale if self.height is None else self.height / max(high[2] - low[2], 1e-30)
+
+
+def write_textured(
+    out: Path, formats: Sequence[str], asset: Asset, occlusion: np.ndarray, placing: Placing
+) -> tuple[np.ndarray, float]:
+    """Writes mesh.glb, mesh.obj, mesh.usdz as requested; returns the origin and the scale of the files."""
+    origin, scale = placing.of(asset.vertices)
+    if placing.moves:
+        asset = dataclasses.replace(asset, vertices=((asset.vertices - origin) * scale).astype(np.float32))
+    if "glb" in formats:
+        write_glb(out / "mesh.glb", asset, occlusion)
+    if "obj" in formats:
+        write_obj(out / "mesh.obj", asset)
+    if "usdz" in formats:
+        write_usdz(out / "mesh.usdz", asset, occlusion)
+    return origin, scale
+
+
+def write_delivered(
+    run: Path, out: Path, formats: Sequence[str], asset: Asset, occlusion: np.ndarray, placing: Placing
+) -> Exported:
+    """Writes what :func:`write_assets` writes of the asset and the light that a run's refinement delivered.
+
+    Raises:
+        InputError: The run's mesh.ply cannot be read, or a format needs a package that is not installed.
+    """
+    if "usdz" in formats:
+        require_usd()
+    origin, scale = write_textured(out, formats, asset, occlusion, placing)
+    mesh = read_mesh(run / "mesh.ply")
+    if "ply" in formats:
+        placed = mesh.copy()
+        placed.vertices = (mesh.vertices - origin) * scale
+        with atomic_path(out / "mesh.ply") as temporary:
+            temporary.write_bytes(placed.export(file_type="ply"))
+    for name in ("environment.exr", "environment.hdr"):
+        with atomic_path(out / name) as temporary:
+            shutil.copyfile(run / name, temporary)
+    _, corners = np.unique(asset.vertices, axis=0, return_inverse=True)
+    closed = is_closed(corners.reshape(-1)[asset.triangles])
+    return Exported(mesh, len(asset.triangles), closed, 0, origin, scale)
 
 
 def write_assets(
@@ -49,16 +115,21 @@ def write_assets(
     resolution: int | None = None,
     n_faces: int | None = None,
     texture_size: int | None = None,
+    name: str = "object",
+    placing: Placing = Placing(),
 ) -> Exported:
     """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder.
 
-    All files are in the data's own world frame; GLB, OBJ and USDZ are decimated, textured and y up. The PLY holds the
-    extracted mesh with vertex colours. What none of the photos' cameras sees is a cap between its edges.
+    All files are in the data's own world frame, or as `placing` says; the light does not change. GLB, OBJ and USDZ are
+    decimated, textured and y up. The PLY holds the extracted mesh with vertex colours. What none of the photos'
+    cameras sees is a cap between its edges.
 
     Args:
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
         formats: Out of :data:`FORMATS`.
         resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for those of the group `export`.
+        name: What the mesh, its material and its images are called.
+        placing: Where the files have the asset.
 
     Raises:
         EmptyMesh: The surface is empty.
@@ -79,12 +150,10 @@ def write_assets(
         vertices, on_surface = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
-        exported = Exported(mesh, len(faces), is_closed(faces), n_dropped)
-        if "ply" in formats:
-            write_mesh_ply(out / "mesh.ply", mesh, surface_materials(surface, vertices)[0])
+        n_textured, watertight, (origin, scale) = len(faces), is_closed(faces), placing.of(mesh.vertices)
         if set(formats) - {"ply"}:
             textured = textured_asset(
-                "object",
+                name,
                 vertices,
                 faces,
                 surface,
@@ -99,15 +168,13 @@ def write_assets(
             asset = dataclasses.replace(
                 textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices)
             )
-            if "glb" in formats:
-                write_glb(out / "mesh.glb", asset, textured.occlusion)
-            if "obj" in formats:
-                write_obj(out / "mesh.obj", asset)
-            if "usdz" in formats:
-                write_usdz(out / "mesh.usdz", asset, textured.occlusion)
-            exported = Exported(mesh, len(asset.triangles), textured.watertight, n_dropped)
+            origin, scale = write_textured(out, formats, asset, textured.occlusion, placing)
+            n_textured, watertight = len(asset.triangles), textured.watertight
+        if "ply" in formats:
+            placed = trimesh.Trimesh((mesh.vertices - origin) * scale, faces, process=False)
+            write_mesh_ply(out / "mesh.ply", placed, surface_materials(surface, vertices)[0])
         write_environment(out, model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy())
-    return exported
+    return Exported(mesh, n_textured, watertight, n_dropped, origin, scale)
 
 
 def write_mesh_ply(path: Path, mesh: trimesh.Trimesh, albedo: np.ndarray | None = None) -> None:

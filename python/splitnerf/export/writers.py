@@ -44,7 +44,8 @@ def glb_content(
     *,
     filtering: int | None = None,
 ) -> bytes:
-    """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside.
+    """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside, all called by the
+    asset's name: NAME and NAME_basecolor, NAME_orm, NAME_normal.
 
     Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
 
@@ -60,7 +61,7 @@ def glb_content(
     maps, material = encode_maps(path, asset, occlusion), asset.materials[0]
     images = [None if pixels is None else Image.fromarray(pixels) for pixels in (maps.albedo, maps.orm, maps.normal)]
     pbr = PBRMaterial(
-        name=material.name,
+        name=asset.name,
         roughnessFactor=float(material.roughness),
         metallicFactor=float(material.metallic),
         baseColorTexture=images[0],
@@ -90,6 +91,13 @@ def glb_content(
         for name in ("_TANGENT", "_COLOR_0"):
             if name in attributes:
                 attributes[name[1:]] = attributes.pop(name)
+        for kind, texture in (
+            ("basecolor", pbr.get("baseColorTexture")),
+            ("orm", pbr.get("metallicRoughnessTexture")),
+            ("normal", tree["materials"][0].get("normalTexture")),
+        ):
+            if texture is not None:
+                tree["images"][tree["textures"][texture["index"]]["source"]]["name"] = f"{asset.name}_{kind}"
         if filtering is not None:
             tree["samplers"] = [{"minFilter": filtering, "magFilter": filtering}]
             tree["textures"] = [texture | {"sampler": 0} for texture in tree["textures"]]

@@ -63,7 +63,7 @@ def _read(document: Document) -> Asset:
     if any(part.colors is not None for part in parts):
         colors = np.concatenate([np.ones((len(p.vertices), 3)) if p.colors is None else p.colors for p in parts])
     asset = Asset(
-        name=path.stem,
+        name=_name_of(document) or path.stem,
         vertices=_z_up(np.concatenate([part.vertices for part in parts])),
         triangles=np.concatenate([p.triangles + start for p, start in zip(parts, starts)]).astype(np.int32),
         normals=_z_up(np.concatenate([part.normals for part in parts])),
@@ -152,6 +152,13 @@ def _read_material(document: Document, index: int | None) -> tuple[Material, Tex
         emission_texture=emission,
     )
     return material, slots
+
+
+def _name_of(document: Document) -> str:
+    """The name of the one mesh of a file; empty where it has several, or no name."""
+    meshes = document.json["meshes"]
+    name = meshes[0].get("name", "") if len(meshes) == 1 else ""
+    return name if isinstance(name, str) else ""
 
 
 class TextureSlots:
