@@ -147,7 +147,7 @@ def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
     """A fifth of the samples, off the surface by the offset, by the step's seed; all off by 0.1 and 0.3 cost 0.1 in each channel."""
     asked, n = {}, 2000
 
-    def factors(scene, positions, *args, **kwargs):
+    def factors(scene, positions, normals, *, lobe_dirs, roughness, environment, **kwargs):
         asked.update(n=len(positions), **kwargs)
         return torch.full((len(positions), channels), 0.5), torch.full((len(positions), channels), 0.5)
 
@@ -186,8 +186,8 @@ def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):
     """About 60 of 200, drawn by the run's own generator: w (0.002^2 + 0.004^2) i^2 over the sum of w."""
     asked = []
 
-    def factors(scene, positions, normals, lobes, roughness, environment, **_):
-        asked.append((positions, normals, lobes, roughness[:, 0]))
+    def factors(scene, positions, normals, lobe_dirs, roughness, environment, **_):
+        asked.append((positions, normals, lobe_dirs, roughness[:, 0]))
         return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
 
     monkeypatch.setattr(losses, "occlusion_factors", factors)
