@@ -28,7 +28,7 @@ from splitnerf.data.reading import SEPARATED, Reading, is_separated
 from splitnerf.data.truth import read_mesh
 from splitnerf.devices import same_bits
 from splitnerf.errors import InputError, note, note_once
-from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, evaluation_path, score_asset, score_fields
+from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, score_asset, score_fields
 from splitnerf.export.meshing import EmptyMesh
 from splitnerf.export.scene import Exported, Placing, write_assets, write_delivered
 from splitnerf.files import is_own, locked
@@ -59,6 +59,7 @@ from splitnerf.run_folder import (
     own_results,
     refuse_no_run,
     write_data_of,
+    write_scores,
 )
 from splitnerf.training.batches import without_fine_levels
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
@@ -201,10 +202,10 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
         n = max(REPORT_VIEWS, VIEW_BUDGET // (views.height * views.width))
         views = views.select(spread(range(len(views)), min(n, len(views))))
     evaluated = score_run(run, model, training.grid, views, mesh, timings, {}, Protocol.spp)
-    write_json(run / "evaluation.json", evaluated.scores)
     timings["evaluation"] = time.monotonic() - clock
     write_run_report(run, model, evaluated, timings)
     forget_state(run)
+    write_scores(run, evaluated.scores)
     if failure:
         raise failure
     return evaluated.scores
@@ -305,9 +306,11 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     with locked(run) if out is None else nullcontext():
         evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol.spp)
         timings["evaluation"] = time.monotonic() - clock
-        write_json(out or evaluation_path(run), evaluated.scores)
         if out is None:
             write_run_report(run, model, evaluated, timings)
+            write_scores(run, evaluated.scores)
+        else:
+            write_json(out, evaluated.scores)
     return evaluated
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from pathlib import Path
@@ -118,12 +119,25 @@ def begin_or_resume(run: Path) -> tuple[bool, bool]:
 
 
 def is_finished(run: Path) -> bool:
-    """Whether a run has delivered what its checkpoint holds: the last file is the report or, where nothing writes one, the
-    evaluation; then its state goes."""
-    checkpoint, last = run / "checkpoint.pt", run / ("report.html" if installed().write_report else "evaluation.json")
-    if not (checkpoint.is_file() and last.is_file()) or (run / STATE).exists():
+    """Whether a run has delivered what its checkpoint holds: its evaluation, the last file, says of which checkpoint it is."""
+    checkpoint, scores = run / "checkpoint.pt", run / "evaluation.json"
+    expected = [checkpoint, scores, *([run / "report.html"] if installed().write_report else [])]
+    if not all(path.is_file() for path in expected) or (run / STATE).exists():
         return False
-    return last.stat().st_mtime_ns >= checkpoint.stat().st_mtime_ns
+    try:
+        return read_json(scores, "checkpoint").get("checkpoint") == digest_of(checkpoint)
+    except InputError:
+        return False
+
+
+def write_scores(run: Path, scores: dict) -> None:
+    """Writes a run's evaluation.json, which says of which checkpoint it is."""
+    write_json(run / "evaluation.json", scores | {"checkpoint": digest_of(run / "checkpoint.pt")})
+
+
+def digest_of(path: Path) -> str:
+    """The SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def is_refined(run: Path) -> bool:

@@ -265,3 +265,15 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatc
         else:
             with pytest.raises(InputError, match="needs more than half of the available memory"):
                 read_asset(path)
+
+
+def test_many_nodes_are_told_of(path, capsys, monkeypatch):
+    gltf = triangle()
+    gltf.json["nodes"] += [{}, {}]
+    gltf.json["scenes"][0]["nodes"] += [1, 2]
+    gltf.write(path)
+    read_asset(path)
+    assert "nodes" not in capsys.readouterr().err
+    monkeypatch.setattr(geometry, "MANY_NODES", 2)
+    read_asset(path)
+    assert "has 3 nodes, which takes a while; join its meshes" in capsys.readouterr().err

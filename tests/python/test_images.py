@@ -1,5 +1,9 @@
 """Image files and environment maps: what is read is what was written, averages and turns are in linear light."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import OpenImageIO as oiio
 import pytest
@@ -155,3 +159,24 @@ def test_slightly_negative_pixels_are_set_to_zero_and_said(tmp_path, capsys):
     read = read_environment(write_raw(tmp_path / "a.exr", radiance))
     assert np.array_equal(read, np.maximum(radiance, 0))
     assert "a.exr: 1 pixels were slightly negative; set to 0" in capsys.readouterr().err
+
+
+FORKS = """
+import os, signal, sys
+from pathlib import Path
+import numpy as np
+from splitnerf.data.images import read_image, write_image
+pixels = np.ones((256, 256, 3), np.float32)
+for name in ("parent.exr", "child.exr"):
+    if name == "child.exr" and os.fork():
+        sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))
+    signal.alarm(30)  # ends a child that waits
+    write_image(Path(name), pixels)
+os._exit(int(read_image(Path("child.exr")).sum() != pixels.sum()))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_program_reads_and_writes_exr(tmp_path):
+    """After its parent has: threads of the parent's are not there."""
+    assert subprocess.run([sys.executable, "-c", FORKS], cwd=tmp_path).returncode == 0

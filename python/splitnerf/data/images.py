@@ -24,6 +24,8 @@ from splitnerf import ops
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path, is_file
 
+oiio.attribute("exr_threads", -1)  # no threads of its own, for which a fork of this program would wait for ever
+
 JPEG_QUALITY = 95
 SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")

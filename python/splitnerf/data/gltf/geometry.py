@@ -11,6 +11,7 @@ from splitnerf.data.gltf.document import Document
 from splitnerf.errors import InputError, note
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+MANY_NODES = 20000  # seconds of work, more or less
 
 
 @dataclass
@@ -33,6 +34,8 @@ def scene_parts(document: Document) -> list[Part]:
     a node contains itself."""
     matrices = _world_matrices(document)
     parts, others = [], False
+    if len(matrices) > MANY_NODES:
+        note(f"{document.path}: has {len(matrices)} nodes, which takes a while; join its meshes")
     for index, matrix in matrices.items():
         node = document.json["nodes"][index]
         if "mesh" not in node:
