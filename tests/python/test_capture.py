@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
-from splitnerf.cli import main
+from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import seen_at
 from splitnerf.data.frames import TEST_STRIDE
@@ -260,6 +260,15 @@ def test_files_tell_of_turns_and_exposures(tmp_path):
     assert first.exposure == pytest.approx(0.25)
     assert first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
     assert (second.exposure, second.focal) == (None, None)
+
+
+def test_two_photos_are_too_few(tmp_path, capsys):
+    (tmp_path / "photos").mkdir()
+    for i, pixels in enumerate(np.random.default_rng(0).integers(0, 255, (2, 40, 60, 3), np.uint8)):
+        Image.fromarray(pixels).save(tmp_path / f"photos/{i}.png")
+    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.endswith("holds 2 of the 3 photos that are the fewest; take 30 or more")
 
 
 @pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])

@@ -221,10 +221,10 @@ def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keeps COLMAP's log to errors."""
+    """Keeps COLMAP's log to what ends the program: errors that are raised have our own words."""
     log = pycolmap.logging
     before = log.minloglevel, log.alsologtostderr
-    log.minloglevel, log.alsologtostderr = log.Level.ERROR.value, False
+    log.minloglevel, log.alsologtostderr = log.Level.FATAL.value, False
     try:
         yield
     finally:

@@ -30,7 +30,7 @@ from splitnerf_tools.capture.photographs import (
     write_png,
 )
 from splitnerf_tools.capture.photometry import Exposures, find_exposures
-from splitnerf_tools.capture.poses import Lens, Reconstruction, reconstruct
+from splitnerf_tools.capture.poses import MIN_PHOTOS, Lens, Reconstruction, reconstruct
 from splitnerf_tools.capture.surroundings import Shot, surroundings
 from splitnerf_tools.capture.turntable import light_turns, write_moving
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -148,6 +148,10 @@ def _sorted_out(
             reasons[photo.name] = "too dark"
         elif s < BLURRED * np.median(sharp):
             reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
+    if len(photos) < MIN_PHOTOS:
+        raise InputError(
+            f"{photos[0].path.parent}: holds {len(photos)} of the {MIN_PHOTOS} photos that are the fewest; take 30 or more"
+        )
     if len(reasons) == len(photos):
         raise InputError(f"{photos[0].path.parent}: all photos are too dark; expose them longer")
     return [photo for photo in photos if photo.name not in reasons], reasons
