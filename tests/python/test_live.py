@@ -17,6 +17,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.export.scene import surface_of
 from splitnerf.export.surface import surface_materials
+from splitnerf.relight.studio import STUDIO_LIGHTS
 from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
 from splitnerf.training.observer import NOBODY, Event, Request
@@ -32,6 +33,7 @@ from tiny_runs import tiny
 from viewer_server import ask, error_of, halves, triangle
 
 CPU = torch.device("cpu")
+OWN = 1 + len(STUDIO_LIGHTS)  # the number of the recovered light: white and the built-in ones come first
 
 
 @pytest.fixture
@@ -124,7 +126,7 @@ def test_nothing_is_made_while_no_page_is_open(stepped):
 
 
 def test_an_open_page_gets_surface_light_and_numbers(stepped):
-    assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [{"name": "mine", "light": 1, "version": 0}]
+    assert json.loads(ask(stepped.server, "scene.json")[2])["sources"] == [{"name": "mine", "light": OWN, "version": 0}]
     with page_of(stepped.server) as heard:
         state = heard()
         assert state["stage"] == "training" and state["version"] == 0 and not state["paused"]
@@ -203,9 +205,9 @@ def test_the_delivered_asset_is_shown(stepped, tmp_path):
         stepped.live(Event(stage, path=folder))
         assert stepped.live.events.state["version"] == version and stepped.live.shown.sources[0].version == version - 1
         (source,) = json.loads(ask(stepped.server, "scene.json")[2])["sources"]
-        assert source == {"name": "mine", "light": 1, "version": version}
+        assert source == {"name": "mine", "light": OWN, "version": version}
         assert ask(stepped.server, "assets/0")[2] == content
-        assert (halves(ask(stepped.server, "lights/1"))[..., :3] == version).all()
+        assert (halves(ask(stepped.server, f"lights/{OWN}"))[..., :3] == version).all()
     (tmp_path / "final/mesh.glb").write_text("hello")
     stepped.live(Event("evaluation", path=tmp_path / "final"))
     scene = json.loads(ask(stepped.server, "scene.json")[2])

@@ -18,9 +18,12 @@ from PIL import Image
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.writers import write_glb
+from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light
 from splitnerf_tools.report import write_report
 from splitnerf_tools.report.drawings import curve_data, line_chart
 from splitnerf_tools.report.embedding import data_uri, script_json
+from splitnerf_tools.report.grades import graded
+from splitnerf_tools.report.run import RELIT_GREY, relit_pictures
 from splitnerf_tools.report.sections import fitted
 
 REPORT = Path(splitnerf_tools.report.__file__).parent
@@ -78,7 +81,9 @@ def write(tmp_path, **changes):
     light = np.ones((4, 8, 3))
     contents = {
         "title": "a <script>alert(1)</script> scene",
-        "summary": {"Key": {"PSNR": 29.321}, "Config": {"light": "<mlp>", "nested": {"on": True, "none": None}}},
+        "grades": graded({"novel_view": {"psnr": 29.321}, "roughness_mae": 0.06348}),
+        "relit": [("studio", np.full((8, 8, 3), 0.5)), ("sunset", np.full((8, 8, 3), 0.25))],
+        "summary": {"Config": {"light": "<mlp>", "nested": {"on": True, "none": None}}},
         "views": [make_view(True)],
         "lights": [{"roughness": r, "g": light, "g_bar": light} for r in (0, 0.25, 0.5, 1)],
         "light_truth": light,
@@ -118,11 +123,11 @@ def picture_of(image):
 
 def test_report_holds_every_part(tmp_path):
     page, parsed = write(tmp_path)
-    # 5 maps of truth and 7 of the prediction; two lights; 4 roughnesses with estimates.
-    assert len(parsed.pictures) == 12 + 2 + 8
+    # 5 maps of truth and 7 of the prediction; two lights; 4 roughnesses with estimates; two relit pictures.
+    assert len(parsed.pictures) == 12 + 2 + 8 + 2
     assert page.count("<svg") == 3
     assert ">0.1</text>" in re.search(r"Loss</figcaption>.*", page)[0]  # decades, not quarters
-    words = "20.00 dB; 29.32; nested.on; ρ = 0.25; true light; hash_encode; width:75.0%; one factor per colour channel"
+    words = "20.00 dB; 29.3 dB; 0.06 off; sunset; nested.on; ρ = 0.25; true light; hash_encode; width:75.0%; one factor per colour channel"
     assert [text for text in words.split("; ") if text not in page] == []
     for anchor in (reference for reference in parsed.references if reference.startswith("#")):
         assert f'id="{anchor[1:]}"' in page
@@ -130,7 +135,7 @@ def test_report_holds_every_part(tmp_path):
 
 def test_report_is_self_contained_and_escaped(tmp_path):
     page, parsed = write(tmp_path)
-    assert all(picture["src"].startswith("data:image/png;base64,") for picture in parsed.pictures)
+    assert all(re.match("data:image/(png|jpeg);base64,", picture["src"]) for picture in parsed.pictures)
     assert all(reference.startswith(("data:", "#")) for reference in parsed.references)
     own = page.replace(parsed.scripts["bundle"], "")
     assert not re.search(r"https?://|@import", own) and "default-src 'none'" in own
@@ -164,7 +169,15 @@ def test_what_is_not_finite_never_reaches_the_script(tmp_path):
 
 
 def test_report_without_truth_or_history(tmp_path):
-    changes = {"lights": [], "light_truth": None, "light": None, "history": [], "timings": {}}
+    changes = {
+        "lights": [],
+        "light_truth": None,
+        "light": None,
+        "history": [],
+        "timings": {},
+        "relit": [],
+        "grades": [],
+    }
     page, parsed = write(tmp_path, views=[make_view(False)], **changes)
     assert len(parsed.pictures) == 7
     assert "<h2>Light</h2>" not in page and "<svg" not in page and "dB<" not in page and "<h2>Object</h2>" not in page
@@ -262,6 +275,62 @@ def test_a_glb_that_does_not_fit_or_cannot_be_read_is_said(tmp_path, glb, monkey
         page, parsed = write(tmp_path, asset=path)
         assert words in page and "glb" not in parsed.scripts
     assert "<h2>Object</h2>" not in write(tmp_path, asset=tmp_path / "none.glb")[0]
+
+
+def test_the_object_comes_first_then_what_was_promised_then_scores(tmp_path, glb):
+    """Links name files beside the page; the sheet has each texture; the 3D view has the lights of `splitnerf relight`."""
+    (tmp_path / "environment.exr").write_bytes(bytes(1_200_000))
+    page, parsed = write(tmp_path, asset=glb)
+    sections = re.findall(r'<section id="(\w+)"', page)
+    assert sections == ["object", "relit", "scores", "views", "light", "training", "numbers"]
+    assert [name for name in parsed.references if not name.startswith(("#", "data:"))] == [
+        "mesh.glb",
+        "environment.exr",
+    ]
+    assert ">1.2 MB<" in page and "1,280 faces, textures of 512 x 512, 64 x 64 pixels; 2 x 2 x 2 units" in page
+    textures = {
+        image["alt"]: picture_of(image)
+        for image in parsed.pictures
+        if image["alt"] in ("albedo", "roughness", "metallic", "normals")
+    }
+    assert textures["albedo"].shape == (512, 512, 3)
+    assert [float(textures[name].mean()) for name in ("roughness", "metallic")] == pytest.approx([0.5, 0.0], abs=0.01)
+    assert textures["normals"].mean(axis=(0, 1)) == pytest.approx([0.5, 0.5, 1.0], abs=0.01)
+    assert [light["name"] for light in data_of(parsed)["studio"]] == list(STUDIO_LIGHTS)
+    assert np.allclose(halves_of(data_of(parsed)["studio"][0])[..., :3], studio_light(STUDIO_LIGHTS[0]), rtol=1e-3)
+    assert page.index("<h2>How good is it?") < page.index("How certain is it?") < page.index("<h2>New views")
+
+
+def test_scores_are_said_in_words():
+    """Higher is better, lower is better; the limits belong to the better word; what is missing has no row."""
+    rows = [
+        ({"novel_view": {"psnr": value}}, word)
+        for value, word in ((30.0, "good"), (29.9, "fair"), (25.0, "fair"), (24.9, "poor"))
+    ]
+    rows += [
+        ({"normal_mae_deg": value}, word)
+        for value, word in ((5.0, "good"), (5.1, "fair"), (12.0, "fair"), (12.1, "poor"))
+    ]
+    for evaluation, word in rows:
+        assert [row["word"] for row in graded(evaluation | {"relight": None, "f_score": None})] == [word], evaluation
+    (angle,) = graded({"normal_mae_deg": 7.12345})
+    assert (angle["name"], angle["value"], angle["scale"]) == (
+        "Normals",
+        "7.1° off",
+        "good up to 5° off, poor above 12° off",
+    )
+
+
+def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):
+    """A white ball casts a shadow on grey ground, and no two lights look alike."""
+    white = with_textures(ball, albedo_texture=np.ones((64, 64, 3), np.float32))
+    pictures = dict(relit_pictures(white))
+    assert set(pictures) <= set(STUDIO_LIGHTS) and len(pictures) == 3
+    ground = linear_to_srgb(np.float32([RELIT_GREY]))[0]
+    for name, picture in pictures.items():
+        assert picture[:4].mean() == pytest.approx(ground, abs=0.02), name  # far behind the ball
+        assert picture[-80:].min() < 0.8 * ground, name  # its shadow
+    assert min(np.abs(pictures[a] - pictures[b]).mean() for a, b in (("studio", "sunny"), ("studio", "sunset"))) > 0.01
 
 
 def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):

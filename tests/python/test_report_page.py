@@ -14,6 +14,8 @@ from splitnerf_tools.report import write_report
 
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
 LAMP = (5, 12)  # row and column of a texel of the true light
+CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals"]
+LIGHT, INPUT = "document.querySelector('#object [name=light]')", "l.dispatchEvent(new Event('input', {bubbles: true}))"
 NO_WEBGL = """const plain = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.startsWith("webgl") ? null : plain.call(this, kind, ...rest); };"""
 
@@ -50,7 +52,7 @@ def report(ball, tmp_path_factory):
     true[LAMP] = (64.0, 8.0, 1.0)
     terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
-    summary = {"Result": {"PSNR": 30.0}, "Settings": {f"s{i}": i for i in range(30)}}
+    summary = {"Settings": {f"s{i}": i for i in range(30)}}
     lights = {"lights": [], "light_truth": true, "light": sky(32)}
     times = {"history": history, "timings": {"training": 3.0}}
     shown = {"summary": summary, "views": views, "asset": folder / "mesh.glb"}
@@ -71,6 +73,20 @@ def seen(report):
         script = f"[...document.querySelectorAll('#{section} button')].find((b) => b.textContent === '{words}').click()"
         return {"do": "text", "name": words, "script": script}
 
+    def choose(channel):
+        number = CHANNELS.index(channel)
+        return {
+            "do": "text",
+            "name": channel,
+            "script": f"document.querySelectorAll('#object [name=channel]')[{number}].click()",
+        }
+
+    def light(name):
+        script = (
+            f"(l => {{ l.selectedIndex = [...l.options].findIndex((o) => o.text === '{name}'); {INPUT} }})({LIGHT})"
+        )
+        return {"do": "text", "name": name, "script": script}
+
     def text(name, selector):
         return {"do": "text", "name": name, "script": f"document.querySelector('{selector}')?.innerText"}
 
@@ -80,12 +96,10 @@ def seen(report):
     stage, object_ = "#views .stage", "#object canvas"
     true_light = "#light .widget figure:nth-child(2) canvas"
     hidden = ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important }"
-    bare = {"do": "style", "content": hidden + ".stage:focus-within, canvas { outline: 0 !important }"}
+    bare = {"do": "style", "content": hidden + ".stage:focus-within { outline: 0 !important } .bar3d { display: none }"}
     asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
     maps = [
-        step
-        for name in ("albedo", "roughness", "metallic", "normals")
-        for step in (click(name, "object"), part(name, object_))
+        step for name in ("albedo", "roughness", "metallic", "normals") for step in (choose(name), part(name, object_))
     ]
     chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
     steps = [
@@ -116,7 +130,7 @@ def seen(report):
         click("roughness", "views"),
         text("rough", "#views .said"),
         part("light", true_light),
-        {"do": "set", "selector": "#light .range input", "value": -5},
+        {"do": "set", "selector": "#light [name=exposure]", "value": -5},
         part("dark", true_light),
         point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128),
         text("radiance", "#light .said"),
@@ -134,10 +148,10 @@ def seen(report):
         text("zero", f"{terms} .tip"),
         part("shaded", object_),
         *maps,
-        click("shaded", "object"),
-        click("true light", "object"),
-        part("other", object_),
-        {"do": "set", "selector": "#object .range:nth-of-type(2) input", "value": 2},
+        choose("shaded"),
+        *(step for name in ("true light", "sunset") for step in (light(name), part(name, object_))),
+        light("true light"),
+        {"do": "set", "selector": "#object [name=exposure]", "value": 2},
         part("brighter", object_),
         {"do": "size", "width": 380, "height": 700},
         {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
@@ -171,9 +185,7 @@ def test_the_slider_parts_truth_and_prediction(seen):
     for name, share in (("half", 0.5), ("quarter", 0.25), ("keys", 0.34)):
         assert share_of(pictures[name], RED) == pytest.approx(share, abs=0.02), name
         assert share_of(pictures[name], BLUE) == pytest.approx(1 - share, abs=0.02), name
-    assert told["texts"]["readout"].startswith(
-        "15, 20: truth 0.80 0.20 0.20 · SplitNeRF 0.20 0.20 0.70 · difference 0.36"
-    )
+    assert told["texts"]["readout"].startswith("15, 20: photo 0.80 0.20 0.20 · render 0.20 0.20 0.70 · difference 0.36")
 
 
 def test_the_error_map_has_the_difference_and_says_its_scale(seen):
@@ -220,8 +232,9 @@ def test_the_asset_turns_up_in_each_channel(seen):
     assert middle(pictures["normals"]) == pytest.approx(front, abs=0.02)
     shaded = middle(pictures["shaded"])
     assert shaded[0] > shaded[1] > shaded[2] > 0.02
-    assert np.abs(pictures["other"] - pictures["shaded"]).mean() > 0.02
-    assert (middle(pictures["brighter"]) > middle(pictures["other"]) + 0.1).all()
+    assert np.abs(pictures["true light"] - pictures["shaded"]).mean() > 0.01  # of the ball, on plain grey
+    assert np.abs(pictures["sunset"] - pictures["true light"]).mean() > 0.02
+    assert (middle(pictures["brighter"]) > middle(pictures["true light"]) + 0.1).all()
 
 
 def test_a_narrow_window_does_not_scroll_sideways(seen):

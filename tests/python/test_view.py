@@ -26,6 +26,7 @@ from splitnerf.data.environment import rotate_environment
 from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average, decode_image, encode_image, read_image, write_image
 from splitnerf.data.reading import Reading
+from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.view import final
 from splitnerf_tools.view import server as server_module
@@ -41,11 +42,12 @@ PAGE = Path(splitnerf_tools.view.__file__).parent
 
 
 def test_what_is_served_is_what_is_on_the_disk(shown_run, served):
-    assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes()
+    script = (PAGE.parent / "report/pages.js").read_bytes()
+    assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes().replace(b"{{SCRIPT}}", script)
     assert ask(served, "assets/0")[2] == (shown_run / "mesh.glb").read_bytes()
     scene = json.loads(ask(served, "scene.json")[2])
     assert scene["sources"] == [{"name": "mine", "light": 0, "version": 1}] and scene["problems"] == []
-    assert [light["name"] for light in scene["lights"]] == ["light of mine", "white"]
+    assert [light["name"] for light in scene["lights"]] == ["recovered light of mine", "white", *STUDIO_LIGHTS]
     light = halves(ask(served, "lights/0"))
     assert np.array_equal(light[..., :3], numbered_sky().astype(np.float16)) and (light[..., 3] == 1).all()
     assert (halves(ask(served, "lights/1")) == 1).all()
@@ -61,6 +63,15 @@ def test_two_assets_and_a_given_light(shown_run, tmp_path):
         assert scene["sources"][1] == {"name": "other.glb", "light": None, "version": 1}
         assert ask(server, "assets/1")[2] == other.read_bytes()
         assert ask(server, "assets/2")[0] == 404
+
+
+def test_a_studio_light_is_shown_first_by_its_name(shown_run):
+    with serving(shown_run, light=Path("sunset")) as server:
+        scene = json.loads(ask(server, "scene.json")[2])
+        number = scene["first_light"]
+        assert {"number": number, "name": "sunset"} in scene["lights"]
+        shown = halves(ask(server, f"lights/{number}"))[..., :3]
+    assert np.allclose(shown, studio_light("sunset"), rtol=1e-3)
 
 
 def test_what_is_damaged_beside_the_asset_becomes_a_line(shown_run, capsys):
@@ -176,7 +187,7 @@ def test_damaged_lights_are_refused_in_one_line(served, tmp_path):
     for name, content in cases.items():
         status, line = error_of(drop(served, name, content))
         assert status == 422 and "\n" not in line and "/tmp" not in line and str(tmp_path) not in line, (name, line)
-    assert len(json.loads(ask(served, "scene.json")[2])["lights"]) == 2
+    assert len(json.loads(ask(served, "scene.json")[2])["lights"]) == 2 + len(STUDIO_LIGHTS)
 
 
 def test_uploads_have_limits(served, monkeypatch):
@@ -307,10 +318,22 @@ def test_two_assets_are_traced_in_turns(shown_run, tmp_path, monkeypatch):
     assert [(asset, spp) for asset, spp, _ in pictures] == [(0, 1), (1, 1), (0, 1), (1, 1), (0, 2), (1, 2)]
 
 
+def test_final_ends_at_the_paths_that_are_asked_for_and_shows_the_ground(shown_run, monkeypatch):
+    monkeypatch.setattr(final, "FIRST_SIDE", 20)
+    with serving(shown_run) as server:
+        plain = streamed(server, **camera_of(60, 40, paths=4))
+        ground = streamed(server, **camera_of(60, 40, paths=4, ground=True))
+        assert ask(server, "final", method="POST", body=json.dumps(camera_of(8, 8, paths=1025)).encode())[0] == 422
+    assert [spp for _, spp, _ in plain] == [1, 1, 2, 4]
+    shadow = (ground[-1][2] - plain[-1][2]).astype(np.float32)
+    assert shadow[..., 3].max() > 0.1 and np.abs(shadow[..., :3]).max() < 1e-3  # it is black
+
+
 def test_a_newer_request_ends_the_one_before(shown_run, monkeypatch):
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    monkeypatch.setattr(final, "MOST_PATHS", 1_000_000)
     tracer = Tracer(ViewedAssets([shown_run]))
-    camera = Camera.of(camera_of(16, 16), 1)
+    camera = Camera.of(camera_of(16, 16, paths=1_000_000), 1)
     first = tracer.pictures(camera, lambda: False)
     assert next(first).spp == 1
     second = []
@@ -458,9 +481,10 @@ def test_a_connection_without_a_token_is_closed_soon(shown_run, monkeypatch):
 def test_a_page_that_goes_ends_its_request(shown_run, monkeypatch):
     """Whatever the number of its file is, which select() refuses above 1023."""
     monkeypatch.setattr(final, "PASSES", (1,) * 1_000_000)
+    monkeypatch.setattr(final, "MOST_PATHS", 1_000_000)
     monkeypatch.setattr(select, "select", lambda *_: pytest.fail("select() was called"))
     with serving(shown_run) as server:
-        with asking_for_pictures(server, **camera_of(16, 16)):
+        with asking_for_pictures(server, **camera_of(16, 16, paths=1_000_000)):
             assert server._open == 1
         wait_until(lambda: server._open == 0)  # else it would not end
 

@@ -11,10 +11,13 @@ from looking_at import keys, look_at, needs_chromium, serving
 from looking_at import picture as picture_at
 from painted_ball import lamps, looking, with_textures
 from PIL import Image
+from scipy.ndimage import maximum_filter
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
 from splitnerf.export.writers import write_glb
-from splitnerf.relight.cameras import bounding_sphere, turntable
+from splitnerf.relight.cameras import HALF_FIELD, bounding_sphere, turntable
+from splitnerf.relight.rendering import lowest
+from splitnerf.relight.studio import studio_light
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.server import ViewServer
@@ -22,9 +25,8 @@ from splitnerf_tools.view.server import ViewServer
 SIZE = 160
 TURN = 90
 CLICKED = 2  # the number of the photo whose camera is clicked
-BARE = (
-    "#names, #said, #fold, #legend { display: none !important } #canvas { outline: 0 !important }"  # the picture alone
-)
+EXPOSURE = "document.querySelector('[name=exposure]')"
+BARE = "#names, #said, #fold, .bar3d { display: none !important }"  # the picture alone
 
 pytestmark = needs_chromium
 
@@ -62,42 +64,83 @@ def seen(run):
 
     said = {"do": "text", "script": "document.getElementById('said').textContent"}
     names = ("albedo", "roughness", "metallic", "normals")
+    background, lit = "document.querySelector('[name=background]')", "document.querySelector('[name=light]')"
+    linked = "HTMLAnchorElement.prototype.click = function () { window.saved = this.download; }"
     steps = [
+        {"do": "before", "script": linked},
         {"do": "size", "width": 700, "height": 440},
         {"do": "open"},
         picture("whole"),
+        *keys("s"),
+        {"do": "text", "name": "saved", "script": "window.saved"},
+        {
+            "do": "text",
+            "name": "bar",
+            "script": "(b => [b.textContent, b.offsetWidth])(document.querySelector('.bar3d'))",
+        },
+        {
+            "do": "text",
+            "name": "titles",
+            "script": "[...document.querySelectorAll('#panel [title]')].map((e) => e.title)",
+        },
+        {"do": "set", "selector": "[name=exposure]", "value": 3},
+        {
+            "do": "text",
+            "name": "reset",
+            "script": f"(e => {{ e.dispatchEvent(new Event('dblclick', {{bubbles: true}})); return e.value; }})({EXPOSURE})",
+        },
+        *keys("2"),
+        {"do": "text", "name": "greyed", "script": f"[{lit}.matches(':disabled'), {EXPOSURE}.matches(':disabled')]"},
+        *keys(".", "b", "1"),
+        {"do": "text", "name": "untouched", "script": f"[{EXPOSURE}.value, {background}.checked]"},
         said | {"name": "start"},
         {"do": "style", "content": BARE},
         {"do": "size", "width": SIZE, "height": SIZE},
-        *keys("h", "b"),
+        *keys("h"),
         picture("shaded"),
-        {"do": "set", "selector": "#turn", "value": TURN},
+        {"do": "set", "selector": "[name=turn]", "value": TURN},
         picture("turned"),
-        {"do": "set", "selector": "#turn", "value": 0},
+        {"do": "set", "selector": "[name=turn]", "value": 0},
         *(step for i, name in enumerate(names) for step in (*keys(str(i + 2)), picture(name))),
+        *keys("3", "u"),
+        picture("unfolded"),
+        *keys("u", "w"),
+        picture("wires"),
+        *keys("w"),
         *keys("1"),
         *keys("."),
         picture("brighter"),
         *keys(",", "t"),
-        picture("aces"),
+        picture("neutral"),
+        *keys("t"),
+        picture("agx"),
         *keys("t"),
         *keys("ArrowLeft", "ArrowUp", "-"),
         picture("moved"),
-        {"do": "text", "name": "home", "script": "document.getElementById('home').click()"},
+        {"do": "text", "name": "home", "script": "document.querySelector('[name=home]').click()"},
         picture("home"),
         {"do": "drag", "from": [80, 80], "to": [110, 80]},
         picture("dragged"),
         *keys("r"),
         {"do": "drop", "path": str(folder / "red.hdr")},
         picture("red"),
-        {"do": "text", "name": "light", "script": "document.querySelector('#light option:checked').textContent"},
+        {"do": "text", "name": "light", "script": "document.querySelector('[name=light] option:checked').textContent"},
         {"do": "drop", "path": str(folder / "cut.exr")},
         picture("kept"),
         said | {"name": "damaged"},
         *keys("b"),
-        {"do": "set", "selector": "#blur", "value": 0},
+        {"do": "set", "selector": "[name=blur]", "value": 0},
         picture("background"),
-        *keys("h"),
+        {
+            "do": "text",
+            "name": "sunny",
+            "script": f"{lit}.value = [...{lit}.options].find((o) => o.text === 'sunny').value",
+        },
+        *keys("b", "-", "-", "-"),
+        picture("shadow"),
+        *keys("g"),
+        picture("shadowless"),
+        *keys("g", "h"),
         {"do": "size", "width": 340, "height": 600},
         picture("narrow"),
         {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
@@ -148,11 +191,11 @@ def through(run, photos):
         return picture_at(folder / f"{name}.png")
 
     def split(value):
-        return {"do": "set", "selector": "#split", "value": value}
+        return {"do": "set", "selector": ".stage input", "value": value}
 
     x, y = place_of_camera(run, photos, CLICKED)
-    bare = {"do": "style", "content": BARE + "#split-row { display: none !important }"}
-    chosen = {"do": "text", "script": "document.getElementById('through').selectedOptions[0].textContent"}
+    bare = {"do": "style", "content": BARE + ".divider, .tag { display: none !important }"}
+    chosen = {"do": "text", "script": "document.querySelector('[name=through]').selectedOptions[0].textContent"}
     steps = [
         {"do": "size", "width": 700, "height": 440},
         {"do": "open"},
@@ -161,7 +204,7 @@ def through(run, photos):
         *keys("r"),
         bare,
         {"do": "size", "width": SIZE, "height": SIZE},
-        *keys("h", "b", "n", "n"),
+        *keys("h", "n", "n"),
         split(100),
         picture("photo"),
         split(0),
@@ -177,16 +220,22 @@ def through(run, photos):
         picture("frusta"),
         {"do": "click", "x": x, "y": y},
         chosen | {"name": "clicked"},
-        *keys("r", "c", "f"),
+        *keys("r", "c"),
+        {"do": "set", "selector": "[name=paths]", "value": 16},
+        *keys("f"),
+        picture("denoised"),
+        {"do": "set", "selector": "[name=denoise]", "value": False},
+        picture("noisy"),
+        {"do": "set", "selector": "[name=paths]", "value": 256},
         picture("final"),
         {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
-        {"do": "set", "selector": "#turn", "value": TURN},
+        {"do": "set", "selector": "[name=turn]", "value": TURN},
         picture("turned"),
         *keys("f"),
         picture("again"),
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("splitnerf_tools.view.final.PASSES", (1, 1, 30))
+        patch.setattr("splitnerf_tools.view.final.PASSES", (1, 1, 14, 16))
         told = look(ViewedAssets([run]), steps, photos)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
@@ -246,12 +295,58 @@ def test_maps_show_their_numbers(seen):
     assert middle(pictures["normals"]) == pytest.approx(0.5 * towards + 0.5, abs=0.02)
 
 
+def test_textures_and_wires_are_shown(seen, ball):
+    """Unfolded, the roughness stands where the texture has a face; between wires, the background."""
+    _, pictures = seen
+    shown = np.abs(pictures["unfolded"] - 0.4).max(axis=2) < 0.01
+    corners = ball.uv[ball.triangles].mean(axis=1)
+    rows, columns = np.int64(corners[:, 1] * SIZE), np.int64(corners[:, 0] * SIZE)
+    covered = maximum_filter(shown, 3)  # a face has few pixels here
+    print(covered[rows, columns].mean(), covered[SIZE - 1 - rows, columns].mean())
+    assert covered[rows, columns].mean() > 0.99  # the first row of the texture is the upper one
+    assert covered[SIZE - 1 - rows, columns].mean() < 0.9
+    wires = np.abs(pictures["wires"] - 0.4).max(axis=2) < 0.1
+    assert 0.02 < wires.mean() < 0.8 * (np.abs(pictures["roughness"] - 0.4).max(axis=2) < 0.01).mean()
+
+
+def test_the_ground_shows_the_shadow_of_the_path_tracer(seen, run):
+    _, pictures = seen
+    source = ViewedAssets([run]).sources[0]
+    view = turntable(source.asset, 1, size=(SIZE, SIZE))[0]
+    centre = bounding_sphere(source.asset)[0]
+    pose = view.pose.copy()
+    pose[:3, 3] = centre + (pose[:3, 3] - centre) / 0.9**3
+    images = AssetRenderer(source.asset).render(
+        studio_light("sunny"), pose, view.intrinsics, SIZE, SIZE, spp=64, catcher_height=lowest(source.asset)
+    )
+    grey = np.float32([0x8F, 0x92, 0x96]) / 255
+    outside = images["alpha"] < 1e-3
+    drawn = 1 - (pictures["shadow"] / grey).mean(axis=2)  # of sRGB codes, which the page mixes
+    assert np.abs(pictures["shadowless"][outside] - grey).max() < 0.01
+    dark, bright = (outside & (images["shadow"] > 0.7)), (outside & (images["shadow"] < 0.02))
+    print(dark.sum(), drawn[dark].mean(), drawn[bright].mean())
+    assert dark.sum() > 100 and drawn[dark].mean() > 0.4 and drawn[bright].mean() < 0.03
+
+
+def test_what_the_controls_say(seen):
+    texts = seen[0]["texts"]
+    assert texts["saved"] == "mine.png"
+    length, pixels_wide = texts["bar"]
+    focal = 220 / np.tan(
+        HALF_FIELD
+    )  # the picture is 440 pixels high; the ball's middle is 1.1 / sin of the half field away
+    assert pixels_wide == pytest.approx(float(length) * focal * np.sin(HALF_FIELD) / 1.1, abs=2) and pixels_wide <= 90
+    assert texts["reset"] == "0" and texts["greyed"] == [True, True] and texts["untouched"] == ["0", False]
+    for words in ("(b)", "([ ]); a double click resets it", "(f)", "(w)"):
+        assert any(words in title for title in texts["titles"]), words
+
+
 def test_keys_and_the_pointer_move_what_they_say(seen):
     _, pictures = seen
     before = middle(pictures["shaded"])
     brighter = middle(pictures["brighter"])
     assert (brighter > before + 0.03).all()
-    for name in ("aces", "moved", "dragged"):
+    for name in ("neutral", "agx", "moved", "dragged"):
         assert np.abs(pictures[name] - pictures["shaded"]).mean() > 0.01, name
     assert np.abs(pictures["home"] - pictures["shaded"]).max() < 0.02
 
@@ -308,6 +403,14 @@ def test_the_final_picture_is_the_path_tracers(through, traced):
         print(name, scores, smooth_psnr(pictures["again"], traced[turn]))
         assert scores[turn] > 45 and all(scores[other] < 35 for other in traced if other != turn)
     assert not np.array_equal(pictures["again"], pictures["turned"])
+
+
+def test_few_paths_are_denoised_on_demand(through, traced):
+    """16 paths a pixel against 64: the middle one of 3 x 3 pixels is nearer than the pixel itself."""
+    _, pictures = through
+    noisy, denoised = (psnr(pictures[name], traced[0]) for name in ("noisy", "denoised"))
+    print(noisy, denoised)
+    assert denoised > noisy + 2
 
 
 def test_two_assets_stand_side_by_side(run, ball, tmp_path):

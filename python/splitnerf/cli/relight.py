@@ -17,7 +17,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Path-traces RUN's mesh.glb, or any metallic-roughness glTF file, under environment maps and "
         "writes NNN.png (sRGB, straight alpha) and NNN.exr (linear, associated alpha) for each frame.",
         epilog=examples(
-            "splitnerf relight runs/data --env studio.hdr --out lit",
+            "splitnerf relight runs/data --env studio --env sunset --out lit",
             "splitnerf relight chair.glb --env studio.hdr --turntable 48 --rotate light --gif --out turn",
         ),
     )
@@ -29,7 +29,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         action="append",
         required=True,
         metavar="MAP",
-        help="equirectangular .exr or .hdr; repeated, each map has a sub-folder",
+        help="equirectangular .exr or .hdr, or a built-in light: studio, overcast, sunny, sunset, window; repeated, each has "
+        "a sub-folder",
     )
     add("--rotate-env", type=float, default=0.0, metavar="DEG", help="turn the light, counter-clockwise from above")
     cameras = parser.add_mutually_exclusive_group()

@@ -12,7 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.environment import read_environment, rotate_environment
+from splitnerf.data.environment import rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
 from splitnerf.files import locked
@@ -29,6 +29,7 @@ from splitnerf.relight.output import (
     write_gif,
     write_mp4,
 )
+from splitnerf.relight.studio import light_named
 from splitnerf.render.path_traced import AssetRenderer
 
 
@@ -94,7 +95,7 @@ def relight(
     if settings.mp4:
         require_ffmpeg()
     background = Background(settings.background)
-    lights = [rotate_environment(read_environment(path), settings.rotate_env) for path in maps]
+    lights = [rotate_environment(light_named(path), settings.rotate_env) for path in maps]
     asset = asset_of(source)
     views = views_of(asset)
     _check_animation(views, settings)
@@ -127,7 +128,7 @@ def render_frames(
 ) -> None:
     """Renders all views under each light into its folder."""
     renderer = AssetRenderer(asset)
-    ground = _lowest(asset) if settings.shadow_catcher else None
+    ground = lowest(asset) if settings.shadow_catcher else None
     exposure = 2.0**settings.exposure
     with tqdm(total=len(lights) * len(views), unit="frame", file=sys.stderr, disable=None) as bar:
         for light, folder in zip(lights, folders):
@@ -164,6 +165,6 @@ def _check_animation(views: list[View], settings: Settings) -> None:
         raise InputError("--mp4 needs frames of at least 2x2 pixels; give a larger --size")
 
 
-def _lowest(asset: Asset) -> float:
+def lowest(asset: Asset) -> float:
     """z of the lowest point, lowered by a millionth of the size so that the ground does not cut into a flat bottom."""
     return float(asset.vertices[asset.triangles][..., 2].min()) - 1e-6 * bounding_sphere(asset)[1]

@@ -27,7 +27,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add(
         "other", type=Path, nargs="?", metavar="OTHER", help="a second one, shown beside the first with the same camera"
     )
-    add("--light", type=Path, metavar="MAP", help="equirectangular .exr or .hdr that is shown first")
+    add("--light", type=Path, metavar="MAP", help="the .exr or .hdr, or built-in light, that is shown first")
     add("--data", type=Path, metavar="DATA", help="the data whose cameras and photos are shown (default: RUN's)")
     add("--port", type=int, default=0, metavar="N", help="of the page's address (default: a free one)")
     add(

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from splitnerf.relight.studio import direction, smoothstep, soft_box
 
-from splitnerf_tools.synth.orbits import direction, orbit, spiral
+from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.writer import SceneWriter
 
 CAMERA_DISTANCE = 3.0
@@ -93,12 +94,12 @@ def build_environment(height: int = 128, width: int = 256) -> np.ndarray:
     zenith, horizon, ground = np.array([0.14, 0.25, 0.52]), np.array([0.50, 0.53, 0.57]), np.array([0.17, 0.12, 0.08])
     sky = horizon + (zenith - horizon) * np.clip(up, 0, 1) ** 0.5
     earth = ground * (1 - 0.5 * np.clip(-up, 0, 1))
-    radiance = earth + (sky - earth) * _smoothstep(-0.04, 0.04, up)
+    radiance = earth + (sky - earth) * smoothstep(-0.04, 0.04, up)
 
     sun = direction(azimuth=35, elevation=48)
     radiance = radiance + np.array([80.0, 67.0, 50.0]) * np.exp((d @ sun - 1) / np.radians(4.0) ** 2)[..., None]
-    radiance = radiance + np.array([1.6, 1.0, 0.5]) * _soft_box(d, direction(azimuth=-105, elevation=28), 0.36, 0.26)
-    radiance = radiance + np.array([0.5, 0.9, 1.4]) * _soft_box(d, direction(azimuth=160, elevation=40), 0.24, 0.40)
+    radiance = radiance + np.array([1.6, 1.0, 0.5]) * soft_box(d, direction(azimuth=-105, elevation=28), 0.36, 0.26)
+    radiance = radiance + np.array([0.5, 0.9, 1.4]) * soft_box(d, direction(azimuth=160, elevation=40), 0.24, 0.40)
     return radiance.astype(np.float32)
 
 
@@ -255,22 +256,3 @@ def _grid_triangles(n_rows: int, n_columns: int, *, wrap_columns: bool) -> np.nd
 
 def _moved(shape: Shape, offset: tuple[float, float, float]) -> Shape:
     return shape[0] + np.array(offset), shape[1], shape[2]
-
-
-# ---- light ----
-
-
-def _smoothstep(lo: float, hi: float, x: np.ndarray) -> np.ndarray:
-    t = np.clip((x - lo) / (hi - lo), 0, 1)
-    return t * t * (3 - 2 * t)
-
-
-def _soft_box(directions: np.ndarray, centre: np.ndarray, half_width: float, half_height: float) -> np.ndarray:
-    """[..., 1] brightness in [0, 1] of a rectangle with soft edges, its halves as tangents of the angle."""
-    right = np.cross([0, 0, 1], centre)
-    right /= np.linalg.norm(right)
-    ahead = np.maximum(directions @ centre, 1e-6)
-    x = np.abs(directions @ right) / ahead / half_width
-    y = np.abs(directions @ np.cross(centre, right)) / ahead / half_height
-    inside = (1 - _smoothstep(0.85, 1.15, x)) * (1 - _smoothstep(0.85, 1.15, y))
-    return (inside * (directions @ centre > 0.1))[..., None]

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
+from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light
 
 from splitnerf_tools.report.drawings import PALETTE, curve_data, line_chart
-from splitnerf_tools.report.embedding import script_json, write_html
+from splitnerf_tools.report.embedding import photo_uri, script_json, write_html
 from splitnerf_tools.report.sections import (
     asset_section,
     embedded_light,
@@ -36,14 +37,15 @@ def write_report(
     light: np.ndarray | None = None,
     asset: Path | None = None,
     albedo_scale: Sequence[float] | None = None,
+    grades: Sequence[Mapping] = (),
+    relit: Sequence[tuple[str, np.ndarray]] = (),
 ) -> None:
     """Writes a self-contained HTML page, atomically: pictures and tables, and a script that makes them answer.
 
     Args:
         path: The file to write.
         title: Heading, for example the scene's name.
-        summary: Tables by name, each row name -> value; nested mappings become dotted rows. The first is shown as
-            tiles, so it should hold a few key numbers; the others are folded.
+        summary: Folded tables by name, each row name -> value; nested mappings become dotted rows.
         views: Per test view `name`, `truth` and `prediction`; both map names of float arrays, each optional: `rgb`
             [H, W, 3] sRGB straight, `alpha` [H, W], `albedo` [H, W, 3] linear, `roughness` [H, W], `metallic` [H, W],
             `normal` [H, W, 3] unit world, `occlusion_diffuse` and `occlusion_specular` [H, W] or [H, W, 1 | 3];
@@ -57,6 +59,8 @@ def write_report(
         light: [h, w, 3] linear radiance that is delivered, or None.
         asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
         albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
+        grades: Scores in words, see :func:`splitnerf_tools.report.grades.graded`.
+        relit: The asset under other lights: their names, and pictures [h, w, 3], sRGB in [0, 1].
 
     Raises:
         OSError: The page cannot be written.
@@ -72,8 +76,9 @@ def write_report(
         "splitnerf_tools.report",
         "report.html.j2",
         title=title,
-        tiles=tables[0] if tables else None,
-        tables=tables[1:],
+        tables=tables,
+        grades=grades,
+        relit=[{"name": name, "picture": photo_uri(picture)} for name, picture in relit],
         views=views_section(views, albedo_scale) if views else None,
         refinement=None if refinement is None else refinement_section(refinement),
         lights=embedded,
@@ -81,19 +86,30 @@ def write_report(
         charts=[line_chart(title, series, log=log) for title, series, log in charts],
         asset=glb,
         timings=[
-            {"name": name, "value": f"{seconds:.4g} s", "share": 100 * seconds / total if total > 0 else 0}
+            {
+                "name": name,
+                "value": f"{seconds:.{0 if seconds >= 10 else 1}f} s",
+                "share": 100 * seconds / total if total > 0 else 0,
+            }
             for name, seconds in timings.items()
         ],
         data=script_json(
             {
-                "lights": [{key: value for key, value in one.items() if key != "picture"} for one in embedded],
+                "name": title,
+                "lights": [unpictured(one) for one in embedded],
+                "studio": [unpictured(embedded_light(name, studio_light(name))) for name in STUDIO_LIGHTS if glb],
                 "charts": [curve_data(title, series, log=log) for title, series, log in charts],
                 "colours": PALETTE,
                 "camera": glb and glb["camera"],
             }
         ),
-        script=Markup(files("splitnerf_tools.report").joinpath("report.js").read_text(encoding="utf-8")),
+        script=Markup(files("splitnerf_tools.report").joinpath("pages.js").read_text(encoding="utf-8")),
     )
+
+
+def unpictured(light: Mapping) -> dict:
+    """What the page's script reads of a light."""
+    return {key: value for key, value in light.items() if key != "picture"}
 
 
 def _rows(table: Mapping, prefix: str = "") -> list[tuple[str, str]]:
@@ -112,7 +128,7 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
-        return f"{value:.4g}"
+        return f"{value:.3g}"
     if isinstance(value, (list, tuple)):
         return ", ".join(_text(item) for item in value)
     return str(value)

@@ -7,23 +7,31 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import over_background
+from splitnerf.data.images import linear_to_srgb, over_background
 from splitnerf.data.truth import load_scene_truth
 from splitnerf.evaluate.scoring import Evaluated, asset_predictions
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import fibonacci_directions, prefilter_light
 from splitnerf.pipeline import REPORT_VIEWS
 from splitnerf.refinement.refine import TRAINED
+from splitnerf.relight.background import compose
+from splitnerf.relight.cameras import turntable
+from splitnerf.relight.rendering import lowest
+from splitnerf.relight.studio import studio_light
 from splitnerf.render.model import SceneModel
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.run_folder import ASSET_FILES, is_refined
 from splitnerf.training.metrics import METRICS, read_metrics
 
+from splitnerf_tools.report.grades import graded
 from splitnerf_tools.report.html import write_report
 
+RELIT = ("studio", "sunny", "sunset")
+RELIT_SIDE, RELIT_SPP, RELIT_GREY = 384, 64, 0.7
 ROUGHNESS = (0.0, 0.25, 0.5, 1.0)  # of the light's panels
 
 
@@ -43,12 +51,9 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
     light = run / "environment.exr"
     write_report(
         run / "report.html",
-        title=f"{run.resolve().name} · {views.name}",
-        summary={
-            "Result": headline(evaluated.scores),
-            "All scores": evaluated.scores,
-            "Settings": asdict(model.config),
-        },
+        title=run.resolve().name,
+        grades=graded(evaluated.scores),
+        summary={"All scores": evaluated.scores, "Settings": asdict(model.config)},
         views=pages,
         refinement=refinement_page(run, views, predictions, shown, evaluated.scores) if is_refined(run) else None,
         lights=light_panels(model),
@@ -57,6 +62,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         timings=timings,
         light=read_environment(light) if light.is_file() else None,
         asset=run / "mesh.glb",
+        relit=relit_pictures(read_asset(run / "mesh.glb")) if (run / "mesh.glb").is_file() else [],
         albedo_scale=evaluated.scores["albedo"] and evaluated.scores["albedo"]["lsq"]["scale"],
     )
 
@@ -80,21 +86,22 @@ def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: l
     return {"views": pages, "summary": scores["refinement"], "lights": lights}
 
 
-def headline(evaluation: dict) -> dict[str, float]:
-    """The most important scores; scores without truth in the data are left out."""
-    novel_view, relight, albedo = (evaluation[key] or {} for key in ("novel_view", "relight", "albedo"))
-    scores = {
-        "novel views, PSNR dB": novel_view.get("psnr"),
-        "novel views, SSIM": novel_view.get("ssim"),
-        "relit views, PSNR dB": relight.get("psnr"),
-        "albedo, PSNR dB": albedo.get("psnr"),
-        "normals, degrees": evaluation["normal_mae_deg"],
-        "roughness, mean error": evaluation["roughness_mae"],
-        "metallic, accuracy": evaluation["metallic_balanced_accuracy"],
-        "light, PSNR dB": evaluation["light_psnr"],
-        "mesh, F-score": evaluation["f_score"],
-    }
-    return {name: value for name, value in scores.items() if value is not None}
+def relit_pictures(asset: Asset) -> list[tuple[str, np.ndarray]]:
+    """The asset path traced on a grey ground under lights that the program makes: name and [h, w, 3] sRGB."""
+    renderer, view, pictures = AssetRenderer(asset), turntable(asset, 1, size=(RELIT_SIDE, None))[0], []
+    for name in RELIT:
+        images = renderer.render(
+            studio_light(name),
+            view.pose,
+            view.intrinsics,
+            view.width,
+            view.height,
+            spp=RELIT_SPP,
+            catcher_height=lowest(asset),
+        )
+        behind = np.full((view.height, view.width, 3), RELIT_GREY, np.float32)
+        pictures.append((name, linear_to_srgb(np.clip(compose(images, behind, 1.0)[..., :3], 0, 1))))
+    return pictures
 
 
 @torch.no_grad()

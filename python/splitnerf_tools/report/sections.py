@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 from PIL import Image
+from splitnerf.data.asset import Asset
 from splitnerf.data.environment import resize_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.gltf.document import Document
@@ -26,6 +27,7 @@ from splitnerf_tools.report.embedding import (
     camera_of,
     data_uri,
     packed,
+    photo_uri,
     tonemapped,
     white_of,
 )
@@ -50,7 +52,8 @@ ROWS = 128  # of a light within the page
 
 
 def asset_section(path: Path | None) -> dict | None:
-    """The 3D view of a GLB: `packed`, its bytes; `camera`; `note`, what was changed or why nothing is shown.
+    """The 3D view of a GLB: `packed`, its bytes; `camera`; `note`, what was changed or why nothing is shown; `facts`; `textures`;
+    and `files` beside the page.
 
     Args:
         path: The GLB; None, and a file that is not there, make no section.
@@ -58,11 +61,52 @@ def asset_section(path: Path | None) -> dict | None:
     if path is None or not path.is_file():
         return None
     try:
-        camera = camera_of(read_asset(path))
+        asset = read_asset(path)
         content, note = fitted(path, MOST_BYTES)
     except InputError as error:
-        return {"packed": None, "camera": None, "note": str(error)}
-    return {"packed": content and packed(content), "camera": camera, "note": note}
+        return {"packed": None, "camera": None, "note": str(error), "facts": None, "textures": [], "files": []}
+    return {
+        "packed": content and packed(content),
+        "camera": camera_of(asset),
+        "note": note,
+        "facts": facts_of(asset),
+        "textures": textures_of(asset),
+        "files": [
+            {"name": name, "size": f"{(path.parent / name).stat().st_size / 1e6:.2g} MB"}
+            for name in (path.name, "environment.exr", "environment.hdr")
+            if (path.parent / name).is_file()
+        ],
+    }
+
+
+def facts_of(asset: Asset) -> str:
+    """How many faces an asset has, and how large it and its textures are."""
+    sizes = {
+        "{1} x {0}".format(*texture.shape)
+        for material in asset.materials
+        for texture in (material.albedo_texture, material.roughness_metallic_texture, material.normal_texture)
+        if texture is not None
+    }
+    used = asset.vertices[asset.triangles.ravel()]
+    edges = " x ".join(f"{edge:.3g}" for edge in np.ptp(used, axis=0))
+    textures = f"textures of {', '.join(sorted(sizes))} pixels" if sizes else "no textures"
+    return f"{len(asset.triangles):,} faces, {textures}; {edges} units wide, deep and high"
+
+
+def textures_of(asset: Asset) -> list[dict]:
+    """The first material's textures: `name` and `picture`."""
+    material, maps = asset.materials[0], {}
+    if material.albedo_texture is not None:
+        maps["albedo"] = linear_to_srgb(np.clip(material.albedo_texture, 0, 1))
+    if (both := material.roughness_metallic_texture) is not None:
+        maps["roughness"], maps["metallic"] = both[..., :1], both[..., 1:]
+    if material.normal_texture is not None:
+        maps["normals"] = 0.5 * material.normal_texture + 0.5
+    return [
+        {"name": name, "picture": photo_uri(np.broadcast_to(small, (*small.shape[:2], 3)))}
+        for name, values in maps.items()
+        for small in [averaged(np.asarray(values, np.float32))[0]]
+    ]
 
 
 def fitted(path: Path, most_bytes: int) -> tuple[bytes | None, str]:
@@ -136,8 +180,13 @@ def views_section(views: Sequence[Mapping], albedo_scale: Sequence[float] | None
     ]
     return {
         "maps": [MAPS[key] for key in maps],
-        "pairs": [comparison(f"truth {key}", key, KINDS.get(key, "number")) | {"name": MAPS[key]} for key in maps],
-        "sides": ["truth", "SplitNeRF"],
+        "pairs": [
+            comparison(f"truth {key}", key, KINDS.get(key, "number"))
+            | {"name": MAPS[key]}
+            | ({"sides": ["photo", "render"]} if key == "rgb" else {})
+            for key in maps
+        ],
+        "sides": ["truth", "render"],
         "views": [
             _view(view, maps, np.ones(3) if albedo_scale is None else np.asarray(albedo_scale)) for view in views
         ],
@@ -160,7 +209,7 @@ def _view(view: Mapping, keys: Sequence[str], scale: np.ndarray) -> dict:
             "cells": [_map_picture(maps, key) if key in maps else None for key in keys],
             "keys": [f"{prefix}{k}" for k in keys],
         }
-        for name, prefix, maps in (("truth", "truth ", truth), ("SplitNeRF", "", prediction))
+        for name, prefix, maps in (("truth", "truth ", truth), ("render", "", prediction))
     ]
     return {"name": view["name"], "score": score, "rows": rows}
 

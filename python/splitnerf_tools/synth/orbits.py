@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from splitnerf.relight.studio import direction
 
 
 def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float = 0.0) -> np.ndarray:
@@ -37,12 +38,6 @@ def orbit(n: int, distance: float, elevation: float, swing: float = 0.0, start: 
     """
     share = np.arange(n) / n
     return _poses(360 * (share + start / n), elevation + swing * np.sin(4 * np.pi * share), distance)
-
-
-def direction(azimuth: float, elevation: float) -> np.ndarray:
-    """Unit vector from degrees: azimuth from +x towards +y, elevation from the horizon."""
-    a, e = np.radians(azimuth), np.radians(elevation)
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
 def _poses(azimuths: np.ndarray, elevations: np.ndarray, distance: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 from splitnerf.data.asset import Asset
-from splitnerf.data.environment import read_environment, resize_environment
+from splitnerf.data.environment import resize_environment
 from splitnerf.data.frames import read_frames
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import encode_image
@@ -21,6 +21,7 @@ from splitnerf.data.pixels import decoded
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, note, plain
 from splitnerf.files import reason
+from splitnerf.relight.studio import STUDIO_LIGHTS, is_studio_light, light_named, studio_light
 
 from splitnerf_tools.report.embedding import camera_of
 
@@ -66,7 +67,7 @@ class ViewedAssets:
 
     Args:
         paths: Runs' folders or GLB files.
-        light: An environment map that is shown first, or None.
+        light: An environment map, or the name of a studio light, that is shown first, or None.
 
     Attributes:
         sources: The assets.
@@ -82,9 +83,13 @@ class ViewedAssets:
         self.frame: Asset | None = None
         self._lights: dict[int, ViewedLight] = {}
         self._next, self._lock = 0, threading.Lock()
-        self._first = None if light is None else self.add_light(light_of(light, light.name))
+        given = light is not None and not is_studio_light(light)
+        self._first = self.add_light(light_of(light, light.name)) if given else None
         self.sources = [self.source_of(path) for path in paths]
         self._white = self.add_light(ViewedLight("white", np.ones((8, 16, 3), np.float32)))
+        studio = {name: self.add_light(ViewedLight(name, studio_light(name))) for name in STUDIO_LIGHTS}
+        if light is not None and not given:
+            self._first = studio[str(light)]
         self.keep_lights()
 
     def light(self, number: int) -> ViewedLight | None:
@@ -160,7 +165,7 @@ class ViewedAssets:
         name, own, environment = name or run_name(glb), None, glb.with_name("environment.exr")
         if glb.name == "mesh.glb" and environment.exists():
             try:
-                own = self.add_light(light_of(environment, f"light of {name}"), light)
+                own = self.add_light(light_of(environment, f"recovered light of {name}"), light)
             except InputError as error:  # it becomes a line
                 self.problems.append(str(error))
                 note(str(error))
@@ -178,7 +183,7 @@ def light_of(path: Path, name: str) -> ViewedLight:
     Raises:
         InputError: It cannot be read.
     """
-    radiance = read_environment(path)
+    radiance = light_named(path)
     height = min(radiance.shape[0], MOST_ROWS)
     return ViewedLight(name, resize_environment(radiance, height, 2 * height))
 

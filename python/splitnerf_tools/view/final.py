@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.layouts.frame import checked_pose
 from splitnerf.errors import InputError
+from splitnerf.relight.rendering import lowest
 from splitnerf.render.path_traced import AssetRenderer
 
 from splitnerf_tools.report.embedding import as_halves
@@ -19,7 +20,20 @@ from splitnerf_tools.view.assets import ViewedAssets
 FIRST_SIDE = 256  # pixels of the first picture's longer side
 LARGEST_SIDE, MOST_PIXELS = 4096, 1 << 22
 PATHS_A_CALL = 1 << 16  # so that a call of the tracer ends soon after the camera moves
-PASSES = (1, 1, 2, 4, 8, 16, 32, 64, 128)  # paths a pixel of the pictures of the whole size, each with those before it
+PASSES = (
+    1,
+    1,
+    2,
+    4,
+    8,
+    16,
+    32,
+    64,
+    128,
+    256,
+    512,
+)  # paths a pixel of the pictures of the whole size, each with those before it
+MOST_PATHS = 1024  # their sum
 
 
 @dataclass(frozen=True)
@@ -32,6 +46,8 @@ class Camera:
         width, height: Pixels.
         lights: The number of each asset's light.
         turn: Degrees by which the light is turned, counter-clockwise seen from above.
+        ground: Whether the ground below the object shows its shadow.
+        paths: Paths a pixel of the last picture, 1 to 1024.
     """
 
     pose: np.ndarray
@@ -40,6 +56,8 @@ class Camera:
     height: int
     lights: tuple[int, ...]
     turn: float
+    ground: bool = False
+    paths: int = 256
 
     @staticmethod
     def of(content: object, n_assets: int) -> Camera:
@@ -52,6 +70,7 @@ class Camera:
             pose = np.reshape(np.array(content["pose"], np.float64), (4, 4))
             intrinsics = tuple(float(value) for value in content["intrinsics"])
             width, height, turn = int(content["width"]), int(content["height"]), float(content["turn"])
+            ground, paths = bool(content.get("ground")), int(content.get("paths", 256))
             lights = tuple(int(number) for number in content["lights"])
         except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"the camera cannot be read ({type(error).__name__}); load the page again") from None
@@ -62,9 +81,11 @@ class Camera:
             and 1e-3 < min(intrinsics[:2])
             and max(map(abs, intrinsics)) < 1e7
         )
-        if not (sizes and lens and len(lights) == n_assets and abs(turn) <= 3600):
+        counts = len(lights) == n_assets and 1 <= paths <= MOST_PATHS
+        if not (sizes and lens and counts and abs(turn) <= 3600):
             raise InputError("the camera has numbers beyond reason; load the page again")
-        return Camera(checked_pose(pose, "the camera's pose"), intrinsics, width, height, lights, turn)
+        pose = checked_pose(pose, "the camera's pose")
+        return Camera(pose, intrinsics, width, height, lights, turn, ground, paths)
 
     def scaled(self, side: int) -> Camera:
         """The same camera with a smaller picture, whose longer side has so many pixels."""
@@ -72,9 +93,7 @@ class Camera:
         width, height = (max(1, round(share * pixels)) for pixels in (self.width, self.height))
         fx, fy, cx, cy = self.intrinsics
         across, down = width / self.width, height / self.height
-        return Camera(
-            self.pose, (fx * across, fy * down, cx * across, cy * down), width, height, self.lights, self.turn
-        )
+        return replace(self, intrinsics=(fx * across, fy * down, cx * across, cy * down), width=width, height=height)
 
 
 @dataclass(frozen=True)
@@ -98,7 +117,9 @@ class Tracer:
 
     def __init__(self, shown: ViewedAssets):
         self._shown = shown
-        self._renderers: dict[int, tuple[Asset, AssetRenderer]] = {}  # of the newest asset of each number
+        self._renderers: dict[
+            int, tuple[Asset, AssetRenderer, float]
+        ] = {}  # of the newest asset of each number, and its ground
         self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
 
     def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:
@@ -115,7 +136,7 @@ class Tracer:
             return self._newest != mine or gone()
 
         with self._working:
-            scenes = [(self._renderer(asset), light) for asset, light in enumerate(lights)]
+            scenes = [(*self._renderer(asset), light) for asset, light in enumerate(lights)]
         yield from self._refined(camera.scaled(FIRST_SIDE), scenes, PASSES[:1], ended)
         yield from self._refined(camera, scenes, PASSES, ended)
 
@@ -136,16 +157,16 @@ class Tracer:
             raise InputError("this light is no longer kept; drop it again")
         return rotate_environment(light.radiance, turn)
 
-    def _renderer(self, asset: int) -> AssetRenderer:
+    def _renderer(self, asset: int) -> tuple[AssetRenderer, float]:
         newest = self._shown.sources[asset].asset
         if asset not in self._renderers or self._renderers[asset][0] is not newest:
-            self._renderers[asset] = newest, AssetRenderer(newest)
-        return self._renderers[asset][1]
+            self._renderers[asset] = newest, AssetRenderer(newest), lowest(newest)
+        return self._renderers[asset][1:]
 
     def _refined(
         self,
         camera: Camera,
-        scenes: list[tuple[AssetRenderer, np.ndarray]],
+        scenes: list[tuple[AssetRenderer, float, np.ndarray]],
         passes: tuple[int, ...],
         ended: Callable[[], bool],
     ) -> Iterator[Picture]:
@@ -153,6 +174,8 @@ class Tracer:
         request."""
         sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
         for number, spp in enumerate(passes):
+            if total >= camera.paths:
+                return
             total += spp
             for asset, scene in enumerate(scenes):
                 with self._working:
@@ -164,14 +187,14 @@ class Tracer:
     def _add(
         self,
         total: np.ndarray,
-        scene: tuple[AssetRenderer, np.ndarray],
+        scene: tuple[AssetRenderer, float, np.ndarray],
         camera: Camera,
         spp: int,
         seed: int,
         ended: Callable[[], bool],
     ) -> bool:
         """Adds spp paths a pixel, some rows at a time; False where it ended before."""
-        renderer, light = scene
+        renderer, ground, light = scene
         fx, fy, cx, cy = camera.intrinsics
         spp_a_call = min(spp, max(1, PATHS_A_CALL // camera.width))
         rows = max(1, PATHS_A_CALL // (camera.width * spp_a_call))
@@ -189,9 +212,10 @@ class Tracer:
                     len(strip),
                     spp=paths,
                     seed=_seed(seed, top, call),
+                    catcher_height=ground if camera.ground else None,
                 )
                 strip[..., :3] += paths * images["radiance"]
-                strip[..., 3] += paths * images["alpha"]
+                strip[..., 3] += paths * (images["alpha"] + images.get("shadow", 0.0))
         return True
 
 

@@ -94,7 +94,8 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
     ):
         self.shown, self.photos, self.host, self.tracer, self.live = shown, photos, host, Tracer(shown), live
         self.events = EventStream() if live is None else live.events
-        self.page = files("splitnerf_tools.view").joinpath("viewer.html").read_bytes()
+        page, script = files("splitnerf_tools.view") / "viewer.html", files("splitnerf_tools.report") / "pages.js"
+        self.page = page.read_bytes().replace(b"{{SCRIPT}}", script.read_bytes())
         self.uploading = threading.Lock()
         self._token = secrets.token_urlsafe(16)
         self._open, self._counting = 0, threading.Lock()

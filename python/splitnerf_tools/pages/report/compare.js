@@ -1,5 +1,5 @@
 // Two pictures of each view with a slider between them, or their difference.
-import { element, placeIn, short, tabs } from "./elements.js";
+import { Divider, element, placeIn, short, tabs } from "../view/elements.js";
 import { difference, paint, read, scaleColours, valueAt } from "./differences.js";
 
 const UNITS = { colour: "", number: "", normal: "°" };
@@ -45,18 +45,12 @@ class Stage {
     this.right = element("img", { alt: "" });
     this.left = element("img", { alt: "" });
     this.error = element("canvas", { role: "img" });
-    this.line = element("div", { class: "divider" });
-    this.names = [element("span", { class: "tag" }), element("span", { class: "tag other" })];
-    this.slider = element("input", { type: "range", min: 0, max: 100, step: 0.5, value: 50 });
-    this.box = element("div", { class: "stage" }, this.right, this.left, this.error, this.line, ...this.names, this.slider);
+    this.divider = new Divider("", () => this.place());
+    const { line, tags, slider } = this.divider;
+    Object.assign(this, { line, names: tags, slider });
+    this.box = element("div", { class: "stage whole" }, this.right, this.left, this.error, ...this.divider.nodes);
     this.said = element("p", { class: "said" });
     article.append(this.box, this.said);
-    this.slider.addEventListener("input", () => this.place());
-    this.slider.addEventListener("pointerdown", () => (this.before = this.slider.value));
-    this.slider.addEventListener("pointercancel", () => {
-      this.slider.value = this.before; // the finger scrolls the page
-      this.place();
-    });
     this.box.addEventListener("pointermove", (event) => this.point(event));
     this.box.addEventListener("pointerleave", () => this.say());
     this.name = article.querySelector("h3").firstChild.textContent.trim();
@@ -102,10 +96,7 @@ class Stage {
   }
 
   place() {
-    const share = this.slider.hidden ? (this.sides?.[0] ? 100 : 0) : Number(this.slider.value);
-    this.left.style.clipPath = `inset(0 ${100 - share}% 0 0)`;
-    this.line.style.left = `${share}%`;
-    this.names.forEach((tag, i) => tag.classList.toggle("covered", !this.slider.hidden && (i ? share > 85 : share < 15)));
+    this.divider.cut(this.left, this.slider.hidden ? (this.sides?.[0] ? 100 : 0) : undefined);
   }
 
   say(words = "") {

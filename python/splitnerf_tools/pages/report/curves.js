@@ -1,6 +1,6 @@
 // The curves of the training: values under the pointer, lines that can be switched off, a logarithmic or a linear axis.
 import uPlot from "uplot";
-import { element, short } from "./elements.js";
+import { element, short } from "../view/elements.js";
 
 const HEIGHT = 260;
 const DECADES = 8; // of a logarithmic axis, from the largest value down

@@ -1,7 +1,8 @@
 // The lights, with an exposure, and the radiance under the pointer.
 import { DataUtils } from "three";
 import { encoded } from "../view/halves.js";
-import { element, placeIn, range, short, tabs, unpacked } from "./elements.js";
+import { listenToSliders, slider, tellSliders } from "../view/controls.js";
+import { element, placeIn, short, tabs, unpacked } from "../view/elements.js";
 
 export async function lights(section, { lights: given }) {
   if (!given.length) return false;
@@ -27,12 +28,13 @@ export async function lights(section, { lights: given }) {
   }
   leave();
   const row = element("div", { class: "toolbar" });
-  row.append(
-    range("Exposure", { min: -10, max: 10, step: 0.25, unit: " EV" }, (stops) => {
-      state.stops = stops;
-      draw();
-    }),
-  );
+  const exposure = slider("exposure", "Exposure", { min: -10, max: 10, step: 0.25, unit: " EV" });
+  listenToSliders(row, () => {
+    state.stops = Number(exposure.querySelector("input").value);
+    draw();
+  });
+  row.classList.add("controls");
+  row.append(exposure);
   if (shown.length > 1) {
     row.append(
       tabs("White", ["each by its own mean", `all as the ${given[0].name}`], (i) => {
@@ -41,6 +43,7 @@ export async function lights(section, { lights: given }) {
       }),
     );
   }
+  tellSliders(row);
   section.querySelector(".lights").after(row, element("div", { class: "cards lights widget" }, ...shown.map((light) => light.figure)), said);
   return true;
 }

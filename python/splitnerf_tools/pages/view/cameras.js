@@ -1,5 +1,6 @@
 // The photos' cameras: drawn as frusta, and looked through with the photo over the picture.
 import * as THREE from "three";
+import { Divider, element } from "./elements.js";
 
 const SIZE = 0.05; // of a frustum, as a share of the cameras' distance from the object
 const NEAR = 14; // pixels within which a click means a camera
@@ -12,8 +13,7 @@ export class Cameras {
     this.lines = list.length ? frusta(list, viewer.controls.target) : null;
     if (this.lines) viewer.overlay.add(this.lines);
     this.photos = document.getElementById("photos");
-    this.split = document.getElementById("split");
-    this.split.addEventListener("input", () => this.place());
+    this.shown = [];
     viewer.addEventListener("drawn", () => this.place());
     viewer.addEventListener("left", () => this.look(-1));
     viewer.canvas.addEventListener("click", (event) => this.clicked(event));
@@ -31,25 +31,31 @@ export class Cameras {
     if (number === this.number) return;
     this.number = number;
     const camera = this.list[number] ?? null;
-    this.photos.replaceChildren(...(camera ? this.viewer.views.map(() => this.photo(number)) : []));
-    this.split.parentElement.hidden = !camera;
+    this.shown = camera ? this.viewer.views.map(() => this.photo(number)) : [];
+    this.photos.replaceChildren(...this.shown.map(({ stage }) => stage));
     this.viewer.lookThrough(camera);
     this.changed?.(number);
   }
 
+  /** A photo over the picture, and the line that divides them. */
   photo(number) {
     const image = new Image();
     image.onerror = () => this.failed?.(number);
-    return Object.assign(image, { alt: `photo ${this.list[number].name}`, src: `photos/${number}` });
+    Object.assign(image, { alt: `photo ${this.list[number].name}`, src: `photos/${number}` });
+    const divider = new Divider("How much of the photo is shown", () => {
+      for (const { divider: other } of this.shown) other.slider.value = divider.slider.value;
+      this.place();
+    });
+    divider.tags.forEach((tag, i) => (tag.textContent = ["photo", "render"][i]));
+    return { image, divider, stage: element("div", { class: "stage" }, image, ...divider.nodes) };
   }
 
-  /** The photo lies where its camera's picture is, left of the slider. */
+  /** The photo lies where its camera's picture is, left of the line. */
   place() {
-    const share = Number(this.split.value);
-    [...this.photos.children].forEach((image, i) => {
+    this.shown.forEach(({ image, divider, stage }, i) => {
       const [left, bottom, width, height] = this.viewer.boxes[i];
-      Object.assign(image.style, { left: `${left}px`, bottom: `${bottom}px`, width: `${width}px`, height: `${height}px` });
-      image.style.clipPath = `inset(0 ${100 - share}% 0 0)`;
+      Object.assign(stage.style, { left: `${left}px`, bottom: `${bottom}px`, width: `${width}px`, height: `${height}px` });
+      divider.cut(image);
     });
   }
 

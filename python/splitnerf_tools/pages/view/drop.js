@@ -1,8 +1,8 @@
-// Lights that are dropped onto the page, or opened by its button.
+// Lights that are dropped onto the page.
 
 const field = (id) => document.getElementById(id);
 
-/** Calls `opened` with each file that is dropped or chosen. */
+/** Calls `opened` with each file that is dropped. */
 export function listenForFiles(opened) {
   let depth = 0; // dragenter and dragleave come for every element under the pointer
   const show = (change) => {
@@ -19,10 +19,5 @@ export function listenForFiles(opened) {
     event.preventDefault();
     show(-depth);
     if (event.dataTransfer.files.length) opened(event.dataTransfer.files[0]);
-  });
-  field("open").addEventListener("click", () => field("file").click());
-  field("file").addEventListener("change", (event) => {
-    if (event.target.files.length) opened(event.target.files[0]);
-    event.target.value = "";
   });
 }

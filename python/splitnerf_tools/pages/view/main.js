@@ -2,10 +2,14 @@
 import { Cameras } from "./cameras.js";
 import { Connection } from "./connection.js";
 import { listenForFiles } from "./drop.js";
+import { addStyle } from "./elements.js";
 import { Final } from "./final.js";
 import { Panel } from "./panel.js";
 import { Lost, readAsset, readLight, readPhoto, readScene, sendLight } from "./server.js";
 import { Training } from "./training.js";
+import chartStyle from "uplot/dist/uPlot.min.css";
+import shared from "./controls.css";
+import style from "./style.css";
 import { Viewer } from "./viewer.js";
 
 /** One line at the bottom of the picture; an empty one takes it away. */
@@ -57,17 +61,15 @@ class Page {
     this.viewer = new Viewer(document.getElementById("canvas"), description);
     this.lights = new Lights(this.viewer, description);
     this.final = new Final(this.viewer, () => this.lights.numbers, say, failed);
-    this.panel = new Panel(this.marked(description), (values) => this.set(values));
+    this.panel = new Panel(this.viewer, this.marked(description), (values) => this.set(values), (file) => this.opened(file));
     this.cameras = new Cameras(this.viewer, description.cameras); // made after the panel, which says at once what it shows
     this.cameras.changed = (number) => this.panel.setThrough(number);
     this.cameras.failed = (number) => readPhoto(number).catch(failed); // asks again, for the server's words
-    this.panel.listen(this.viewer);
     this.training = description.training ? new Training(failed) : null;
     document.title = `${description.sources.map((source) => source.name).join(" | ")} – splitnerf ${this.training ? "train" : "view"}`;
     document.getElementById("names").replaceChildren(
       ...description.sources.map((source) => Object.assign(document.createElement("span"), { textContent: source.name })),
     );
-    document.getElementById("home").addEventListener("click", () => this.viewer.home());
     listenForFiles((file) => this.opened(file));
   }
 
@@ -90,7 +92,7 @@ class Page {
     say(`reading ${file.name} …`);
     try {
       const number = await sendLight(file);
-      this.panel.setLights(this.marked(await readScene()).lights, number);
+      this.panel.showLights(this.marked(await readScene()).lights, number);
       this.panel.tell();
       say("");
     } catch (error) {
@@ -123,7 +125,7 @@ class Page {
       const description = this.marked(await readScene());
       await Promise.all(this.viewer.views.map((view, i) => this.loadInto(view, i, description.sources[i])));
       this.description = description;
-      this.panel.setLights(description.lights, this.panel.values.light);
+      this.panel.showLights(description.lights, this.panel.values.light);
       this.viewer.start = description.camera;
       if (first) this.viewer.home(); // later the camera stays where it is
       if (!first || this.training) await this.lights.renew(description);
@@ -157,6 +159,9 @@ async function start() {
   document.addEventListener("visibilitychange", () => page.renew());
 }
 
-start()
-  .catch(failed)
-  .finally(() => document.body.classList.add("ready"));
+export function viewer() {
+  addStyle(chartStyle + shared + style);
+  return start()
+    .catch(failed)
+    .finally(() => document.body.classList.add("ready"));
+}

@@ -2,9 +2,11 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { matrixOf } from "./cameras.js";
+import { element } from "./elements.js";
 import { PLAIN, View } from "./view.js";
 
-const TONES = { none: THREE.LinearToneMapping, aces: THREE.ACESFilmicToneMapping }; // linear: exposure alone
+const TONES = { none: THREE.LinearToneMapping, neutral: THREE.NeutralToneMapping, agx: THREE.AgXToneMapping }; // linear: exposure alone
+const BAR = 90; // pixels that a scale bar has at most
 
 /** Tells "drawn" after each picture, and "left" where the user moves away from a photo's camera. */
 export class Viewer extends EventTarget {
@@ -25,6 +27,8 @@ export class Viewer extends EventTarget {
     this.boxes = [];
     this.through = null; // the photo's camera that is looked through
     this.factor = 1; // its exposure
+    this.bar = element("div", { class: "bar3d", title: "a length at the object's middle, in the units of the data" });
+    canvas.after(this.bar);
     this.home();
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
@@ -99,6 +103,7 @@ export class Viewer extends EventTarget {
     const size = this.renderer.getSize(new THREE.Vector2());
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false);
+    const more = this.views.map((view) => view.casts(this.through) && view.ground.grow(this.renderer, view.object));
     this.renderer.toneMappingExposure = this.factor * 2 ** this.values.exposure;
     this.renderer.setScissorTest(false);
     this.renderer.clear();
@@ -108,10 +113,34 @@ export class Viewer extends EventTarget {
     this.views.forEach((view, i) => {
       this.renderer.setViewport(...this.boxes[i]);
       this.renderer.setScissor(...this.boxes[i]);
-      view.render(this.renderer, this.camera);
+      view.render(this.renderer, this.camera, this.boxes[i], this.through);
       this.renderer.render(this.overlay, this.camera);
     });
+    this.measure();
     this.dispatchEvent(new Event("drawn"));
+    if (more.some(Boolean)) this.draw();
+  }
+
+  /** The scale bar: 1, 2 or 5 times a power of ten. */
+  measure() {
+    const { channel, unfolded } = this.values ?? {};
+    const [, , width, height] = this.boxes[0];
+    const pixels = this.intrinsics(width, height)[0] / this.camera.position.distanceTo(this.controls.target); // of a length of 1
+    const power = 10 ** Math.floor(Math.log10(BAR / pixels));
+    const length = [5, 2, 1].find((factor) => factor * power * pixels <= BAR) * power;
+    this.bar.hidden = channel === undefined || unfolded;
+    this.bar.textContent = String(Number(length.toPrecision(1)));
+    this.bar.style.width = `${length * pixels}px`;
+  }
+
+  /** Saves the picture as it is shown. */
+  save(name) {
+    this.drawNow();
+    this.canvas.toBlob((content) => {
+      const link = element("a", { href: URL.createObjectURL(content), download: `${name}.png` });
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
   }
 
   /** [left, bottom, width, height] of a picture in its part of the window: of a photo's shape where its camera is looked through. */

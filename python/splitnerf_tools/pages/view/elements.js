@@ -12,6 +12,8 @@ export function element(tag, attributes = {}, ...contents) {
   return made;
 }
 
+export const addStyle = (content) => document.head.append(element("style", {}, content));
+
 /** Buttons of which one is chosen, by pointer or arrow keys; `chosen` gets its number, at once that of the first. */
 export function tabs(label, names, chosen) {
   const buttons = names.map((name, i) => element("button", { type: "button", role: "radio", onclick: () => choose(i) }, name));
@@ -35,21 +37,27 @@ export function tabs(label, names, chosen) {
   return row;
 }
 
-/** A slider with its name and value; `moved` gets the number, at once the first one. */
-export function range(name, { min, max, step, value = 0, unit = "" }, moved) {
-  const shown = element("output");
-  const input = element("input", { type: "range", min, max, step, value, "aria-label": name });
-  const tell = () => {
-    shown.value = `${input.value}${unit}`;
-    moved(Number(input.value));
-  };
-  input.addEventListener("input", tell);
-  input.addEventListener("dblclick", () => {
-    input.value = value;
-    tell();
-  });
-  tell();
-  return element("label", { class: "range" }, element("span", {}, name, " ", shown), input);
+/** A line between two pictures that is dragged: `nodes` stand above them, `moved` is called after each move. */
+export class Divider {
+  constructor(label, moved) {
+    this.line = element("div", { class: "divider" });
+    this.tags = [element("span", { class: "tag" }), element("span", { class: "tag other" })];
+    this.slider = element("input", { type: "range", min: 0, max: 100, step: 0.5, value: 50, "aria-label": label });
+    this.nodes = [this.line, ...this.tags, this.slider];
+    this.slider.addEventListener("input", moved);
+    this.slider.addEventListener("pointerdown", () => (this.before = this.slider.value));
+    this.slider.addEventListener("pointercancel", () => {
+      this.slider.value = this.before; // the finger scrolls the page
+      moved();
+    });
+  }
+
+  /** Cuts the left picture; a share of 0 or 100 % where there is one alone. */
+  cut(left, share = Number(this.slider.value)) {
+    left.style.clipPath = `inset(0 ${100 - share}% 0 0)`;
+    this.line.style.left = `${share}%`;
+    this.tags.forEach((tag, i) => tag.classList.toggle("covered", !this.slider.hidden && (i ? share > 85 : share < 15)));
+  }
 }
 
 /** Where the pointer is within an element, as shares of its width and height in [0, 1). */
