@@ -194,6 +194,10 @@ POINT = {"normals": X, "view_dirs": X, "albedo": X, "roughness": ONE, "metallic"
         ),
         (lambda: ops.split_sum_shade(**POINT | {"diffuse": 1}), "split_sum_shade: diffuse must be a tensor, got int"),
         (lambda: ops.light_queries(X, None, ONE), "light_queries: view_dirs must be a tensor, got NoneType"),
+        (
+            lambda: ops.light_queries(X, X.to_sparse(), ONE),
+            "light_queries: view_dirs must be dense, got torch.sparse_coo",
+        ),
         (lambda: ops.linear_to_srgb(np.ones(3)), "linear_to_srgb: linear must be a tensor, got ndarray"),
         (lambda: ops.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
         (
@@ -206,6 +210,12 @@ def test_an_argument_of_another_type_is_named_in_one_line(call, words):
     with pytest.raises(TypeError) as error:
         call()
     assert str(error.value) == words
+
+
+def test_want_of_memory_is_said():
+    """13 PB of directions."""
+    with pytest.raises(MemoryError, match="^sample_ggx_lobe: aten::new_empty failed, as a rule for want of memory$"):
+        ops.sample_ggx_lobe(X.expand(1 << 20, 3), ONE.expand(1 << 20, 1), 1 << 20)
 
 
 def test_what_is_missing_or_unknown_is_named_by_python():

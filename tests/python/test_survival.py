@@ -22,6 +22,7 @@ from splitnerf.progress import Interrupt, ended_by_signals
 from splitnerf.training import loop
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.metrics import METRICS, keep_metrics, read_metrics
+from splitnerf_tools.report.html import _charts
 from test_files import held
 from test_train import flat, same
 from tiny_runs import SMALL, as_options, command, contents, lines_of, tiny, train, train_scene
@@ -355,6 +356,15 @@ def test_a_damaged_log_is_mended(data, tmp_path):
     for steps in (8, 12):
         assert train(data, run, "--steps", str(steps), "--resume") == DONE
         assert [line["step"] for line in lines_of(run)] == list(range(1, steps + 1))
+
+
+def test_numbers_too_large_for_a_float_are_no_news_in_a_log(tmp_path):
+    """Of 400 digits, in a line that can be read, and as the step of another."""
+    huge = "1" + "0" * 400
+    (tmp_path / METRICS).write_text(f'{{"step": 1, "loss": {huge}, "psnr": 20.0}}\n{{"step": {huge}, "loss": 1.0}}\n')
+    lines = read_metrics(tmp_path / METRICS)
+    assert [line["step"] for line in lines] == [1]
+    assert [title for title, *_ in _charts(lines)] == ["PSNR of the batch (dB)"]
 
 
 FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "trained/mesh.glb")

@@ -174,6 +174,8 @@ def front(n_rows: int = 1, **own: int) -> Callable[[Callable], Callable]:
                 bound.apply_defaults()
                 return in_rows(bound.arguments)
             except (AttributeError, RuntimeError, TypeError) as error:
+                if failed := re.search('torch_call_dispatcher\\( "(.*?)"', str(error)):
+                    raise MemoryError(f"{name}: {failed[1]} failed, as a rule for want of memory") from None
                 if (wrong := _wrong_type(signature, args, kwargs, str(error))) is None:
                     raise
             raise TypeError(f"{name}: {wrong}")
@@ -193,6 +195,8 @@ def _wrong_type(signature: inspect.Signature, args: tuple, kwargs: dict, error: 
         kind = str(signature.parameters[argument].annotation)
         if kind.startswith("Tensor") and not isinstance(x, Tensor) and (x is not None or "None" not in kind):
             return f"{argument} must be a tensor, got {type(x).__name__}"
+        if isinstance(x, Tensor) and (x.layout is not torch.strided or x.is_quantized):
+            return f"{argument} must be dense, got {'quantised numbers' if x.is_quantized else x.layout}"
     found = re.search("a value of type '(.*)' for argument '(.*)' but instead found type '(.*)'", error)
     return None if found is None else f"{found[2]} must be of type {found[1]}, got {found[3]}"
 

@@ -100,7 +100,7 @@ def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Da
 
 def _parsed(text: str) -> dict | None:
     try:
-        line = json.loads(text)
+        line = json.loads(text, parse_int=lambda digits: int(digits) if len(digits) < 20 else float(digits))
     except (ValueError, RecursionError):
         return None
     return line if isinstance(line, dict) and type(line.get("step")) is int else None
