@@ -1,6 +1,7 @@
 """From photographs to data: each part against closed forms, and the whole on a painted ball."""
 
 import fcntl
+import io
 import json
 import subprocess
 import sys
@@ -260,6 +261,23 @@ def test_files_tell_of_turns_and_exposures(tmp_path):
     assert first.exposure == pytest.approx(0.25)
     assert first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
     assert (second.exposure, second.focal) == (None, None)
+
+
+def test_damaged_exif_costs_no_photo(tmp_path):
+    """Whatever one, two or five of its bytes say."""
+    exif, data, random = Image.Exif(), io.BytesIO(), np.random.default_rng(0)
+    exif[0x0112], exif[0x010F] = 6, "Maker"
+    exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 2.0, 0x8827: 100, 0xA405: 26})
+    Image.fromarray(random.integers(0, 255, (8, 12, 3), np.uint8)).save(data, "jpeg", exif=exif)
+    good, path = data.getvalue(), tmp_path / "a.jpg"
+    first, length = good.index(b"Exif") + 6, len(exif.tobytes()) - 6
+    for _ in range(400):
+        changed = bytearray(good)
+        for at in random.integers(first, first + length, random.choice((1, 2, 5))):
+            changed[at] = random.choice((0, 255, random.integers(256)))
+        path.write_bytes(changed)
+        (photo,) = find_photographs(tmp_path)
+        assert read_upright(path).shape == (photo.height, photo.width, 3)
 
 
 def test_two_photos_are_too_few(tmp_path, capsys):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import ExifTags, Image, ImageOps
+from PIL import ExifTags, Image
 from splitnerf.data.images import from_profile
 from splitnerf.errors import InputError, note_once, plain
 from splitnerf.files import atomic_path
@@ -23,6 +23,9 @@ VIDEO = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
 MAX_PIXELS = 200_000_000
+T = Image.Transpose
+UPRIGHT = (T.FLIP_LEFT_RIGHT, T.ROTATE_180, T.FLIP_TOP_BOTTOM, T.TRANSPOSE, T.ROTATE_270, T.TRANSVERSE, T.ROTATE_90)
+TURNS = dict(enumerate(UPRIGHT, start=2))  # what turns a photo upright, by its EXIF orientation
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,8 @@ def read_upright(path: Path) -> np.ndarray:
         except (rawpy.LibRawError, OSError) as error:
             raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
-        upright, profile = ImageOps.exif_transpose(image), image.info.get("icc_profile")
+        turn, profile = TURNS.get(_exif(image, path).get(ExifTags.Base.Orientation)), image.info.get("icc_profile")
+        upright = image if turn is None else image.transpose(turn)
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
             return np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
         pixels = np.asarray(upright.convert("RGB"))
@@ -211,9 +215,9 @@ def _described(path: Path, name: str) -> Photograph:
 
 
 def _positive(value: object) -> float | None:
-    """A number above 0, or None."""
+    """A number above 0 that a camera can mean, or None."""
     try:
         number = float(value)
     except (TypeError, ValueError, ZeroDivisionError):
         return None
-    return number if 0 < number < math.inf else None
+    return number if 1e-9 < number < 1e9 else None
