@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 
+LONGEST_LINE = 2000  # characters of a message
 _said: set[str] = set()
 
 
 def plain(text: str) -> str:
-    """A text as one line without control characters, which names from files may hold."""
-    return escaped(" ".join(text.splitlines()))
+    """A text as one line without control characters, which names from files may hold; of a long one both ends."""
+    line = escaped(" ".join(text.splitlines()))
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 500]} ... {line[-500:]}"
 
 
 def escaped(text: str, kept: str = "") -> str:

@@ -277,3 +277,11 @@ def test_many_nodes_are_told_of(path, capsys, monkeypatch):
     monkeypatch.setattr(geometry, "MANY_NODES", 2)
     read_asset(path)
     assert "has 3 nodes, which takes a while; join its meshes" in capsys.readouterr().err
+
+
+def test_a_long_name_is_shortened_in_a_message(path, capsys):
+    gltf = Gltf()
+    gltf.node(mesh=gltf.mesh(gltf.primitive(material=gltf.material(name="x" * 5000, alphaMode="BLEND"))))
+    read_asset(gltf.write(path))
+    said = [line for line in capsys.readouterr().err.splitlines() if "xxx" in line]
+    assert len(said) == 1 and len(said[0]) < 2100 and said[0].endswith("(alphaMode BLEND); drawn opaque")
