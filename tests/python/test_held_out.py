@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from painted_ball import sky
+from painted_ball import photos, sky, with_textures
 from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
 from splitnerf.refinement.stage import PATIENCE, Candidate, Stage
@@ -121,6 +121,22 @@ def test_what_is_best_on_held_out_pixels_is_delivered(painted, monkeypatch, good
     error = np.abs(refined.asset.materials[0].albedo_texture - albedo.numpy()).max()
     assert error < (0.1 if good else 0.3) and refined.held[1] <= refined.held[0]
     assert (refined.held[1] < 0.3 * refined.held[0]) == bool(good)
+
+
+@pytest.mark.parametrize("true", [False, True])
+def test_normals_that_explain_nothing_are_left_out(painted, true):
+    """A relief that the photos show is kept; noise that they do not show is left out."""
+    asset, data = painted
+    tilted = np.random.default_rng(0).normal(0, 0.01 if true else 0.2, asset.materials[0].normal_texture.shape) + [
+        0.3 * true,
+        0,
+        1,
+    ]
+    tilted = np.float32(tilted / np.linalg.norm(tilted, axis=2, keepdims=True))
+    tilted = with_textures(asset, normal_texture=tilted)
+    stage = Stage(photos(tilted, sky(), spp=32) if true else data, tilted, sky(), SETTINGS)
+    stage.best = stage.last = stage._candidate(1, stage.fit.held_errors())
+    assert (stage.result().asset.materials[0].normal_texture is not None) == true
 
 
 def test_a_stage_goes_on_with_its_best(painted):

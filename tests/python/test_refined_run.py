@@ -428,6 +428,9 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     print_refinement(summary | {"delivered": 0, "lamp": True})
     said = capsys.readouterr().out
     assert "no step helped the photos held out" in said and "a lamp that training had smeared" in said
+    for with_texture in (False, True):
+        print_refinement(summary | {"normal_texture": with_texture})
+        assert ("no normal texture is delivered" in capsys.readouterr().out) != with_texture
     print_refinement(None)
     assert capsys.readouterr().out == ""
 

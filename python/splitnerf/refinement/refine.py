@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.asset import Asset
+from splitnerf.data.asset import Asset, vertex_tangents
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, with_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
@@ -186,12 +186,24 @@ def read_source(source: Path) -> tuple[Asset, np.ndarray]:
     path = source / "mesh.glb"
     if not path.is_file():
         raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {source}`")
-    asset, light = read_asset(path), read_light(source)
+    asset, light = with_normal_texture(read_asset(path)), read_light(source)
     try:
         check_form(asset)
     except ValueError as error:
         raise InputError(f"{path}: {error}; give an asset that `splitnerf train` or `export` wrote") from error
     return asset, light
+
+
+def with_normal_texture(asset: Asset) -> Asset:
+    """The asset with the mesh's own normals as its normal texture, if a refinement has left it out."""
+    material = asset.materials[0]
+    if material.normal_texture is not None or material.albedo_texture is None or asset.uv is None:
+        return asset
+    straight = np.tile(np.float32([0, 0, 1]), (*material.albedo_texture.shape[:2], 1))
+    tangents = vertex_tangents(asset.vertices, asset.triangles, asset.normals, asset.uv)
+    return dataclasses.replace(
+        asset, tangents=tangents, materials=[dataclasses.replace(material, normal_texture=straight)]
+    )
 
 
 def begin(
@@ -223,6 +235,7 @@ def record_of(refined: Refined, seconds: float) -> dict:
         "saturated": refined.saturated,
         "held_out": list(refined.held),
         "delivered": refined.delivered,
+        "normal_texture": refined.asset.materials[0].normal_texture is not None,
         "sweeps": [sweep._asdict() for sweep in refined.sweeps],
     }
 
@@ -238,6 +251,7 @@ def refinement_summary(run: Path) -> dict:
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
+        "normal_texture": record["normal_texture"],
         "lamp": record["lamp"] is not None,
         "saturated": record["saturated"],
     }

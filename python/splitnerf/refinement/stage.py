@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable
@@ -99,7 +100,8 @@ class Stage:
     """A refinement, sweep by sweep, with a state from which another process can continue.
 
     An eighth of the photos is not fitted. PATIENCE sweeps after the one that left these photos the smallest error the fit
-    ends. The texels and the light after the last sweep are delivered, unless that one, or the start, is clearly better.
+    ends. The texels and the light after the last sweep are delivered, unless that one, or the start, is clearly better;
+    without the normal texture, unless these photos are explained clearly worse without it.
 
     The minutes limit it: after OUTLINE_SHARE of them no further round of the outline begins, except the first, and no
     lamp is searched for. A sweep takes at most a LEAST_SWEEPS-th of them, the last one the rest. One sweep is always
@@ -239,10 +241,24 @@ class Stage:
             "fit": self.fit.state(),
         }
 
+    def normals_show(self, chosen: Candidate) -> bool:
+        """Whether the mesh's own normals explain the photos held out worse than the normal texture does."""
+        judge = copy.copy(self.fit)
+        judge.light = copy.copy(judge.light)
+        judge.light.levels = chosen.light
+        judge.unknowns = chosen.unknowns.clone()
+        judge.unknowns[:, -2:] = 0.0  # tilts
+        held = [error / (1.0 if chosen.number else BIASED) for error in chosen.held]
+        return Candidate(0, judge.held_errors().tolist(), judge.unknowns, chosen.light).is_worse(
+            chosen._replace(held=held)
+        )
+
     def result(self) -> Refined:
         """The result so far."""
         fit, chosen = self.fit, self.best if self.last.is_worse(self.best) else self.last
         asset = fit.texels.asset_with(fit.texels.maps(to_values(chosen.unknowns)))
+        if not self.normals_show(chosen):
+            asset = replace(asset, materials=[replace(asset.materials[0], normal_texture=None)])
         light = radiance_of(chosen.light).numpy()
         held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else BIASED))
         saturated = float(fit.pixels.saturated.mean())
