@@ -401,6 +401,15 @@ class TestFoot:
         beside = torch.from_numpy(self.lifted(np.array([[0.6, 0.6]]), 0.0))
         assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
 
+    def test_heights_are_over_the_table_that_the_field_shows(self):
+        """The field shows the table, and with it the plinth, deeper than the plane through the cameras' sparse points."""
+        points, colours, post = self.scene(0.012, 0.003)
+        shown = points - 0.006 * self.TABLE.normal
+        table = Table.through(self.TABLE.normal, self.TABLE.offset, shown)
+        assert table.offset == pytest.approx(self.TABLE.offset - 0.006, abs=2e-3) and table.height < 0.012
+        foot = find_foot(table, shown, colours, post)
+        assert foot.holds(self.over(0.38, 0.0)).all() and not foot.holds(self.over(0.42, 0.0)).any()
+
     @pytest.mark.parametrize("place, raised, held", [(0.36, -0.012, True), (0.44, 0.02, False)])
     def test_where_heights_are_wrong_colour_decides(self, place, raised, held):
         """A notch in the plinth's edge, and a bump of the table beside it."""

@@ -31,11 +31,13 @@ class Table:
 
     @classmethod
     def through(cls, normal: np.ndarray, offset: float, points: np.ndarray) -> Table:
-        """The table on this plane, with a height by how far the points [n, 3] that photos show of it scatter."""
-        apart = np.abs(points @ normal - offset)
-        near = apart[apart < ON_TABLE]
-        deviation = 1.4826 * float(np.median(near)) if len(near) else ON_TABLE
-        return cls(normal, offset, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
+        """The table at the height, near this plane, at which photos show it by points [n, 3], with a height by how far they
+        scatter around it."""
+        apart = points @ normal - offset
+        near = apart[np.abs(apart) < ON_TABLE]
+        middle = float(np.median(near)) if len(near) else 0.0
+        deviation = 1.4826 * float(np.median(np.abs(near - middle))) if len(near) else ON_TABLE
+        return cls(normal, offset + middle, min(max(NOISE * deviation, LEAST_HEIGHT), LARGEST_HEIGHT))
 
     def heights(self, points: np.ndarray | Tensor) -> np.ndarray | Tensor:
         """Heights [...] of points [..., 3] over the table."""
