@@ -251,7 +251,7 @@ def refinement_summary(run: Path) -> dict:
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
-        "normal_texture": record["normal_texture"],
+        "normal_texture": record.get("normal_texture", True),  # runs from before it could be left out
         "lamp": record["lamp"] is not None,
         "saturated": record["saturated"],
     }
