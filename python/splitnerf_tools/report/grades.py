@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -49,7 +50,7 @@ def graded(evaluation: Mapping) -> list[dict]:
             continue
         sign = 1 if score.good > score.poor else -1
         word = "good" if sign * value >= sign * score.good else "poor" if sign * value < sign * score.poor else "fair"
-        good, poor = (score.text.format(limit).replace(".0", "") for limit in (score.good, score.poor))
+        good, poor = (re.sub(r"\.0(?!\d)", "", score.text.format(limit)) for limit in (score.good, score.poor))
         scale = f"good from {good}, poor below {poor}" if sign > 0 else f"good up to {good}, poor above {poor}"
         rows.append({"name": score.name, "value": score.text.format(value), "word": word, "scale": scale})
     return rows
