@@ -286,7 +286,7 @@ def test_two_photos_are_too_few(tmp_path, capsys):
         Image.fromarray(pixels).save(tmp_path / f"photos/{i}.png")
     assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "out")]) == BAD_INPUT
     said = capsys.readouterr().err.splitlines()[-1]
-    assert said.endswith("holds 2 of the 3 photos that are the fewest; take 30 or more")
+    assert said.endswith("holds 2 different photos, fewer than 3; take 30 or more")
 
 
 @pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])

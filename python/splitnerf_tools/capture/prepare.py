@@ -149,9 +149,8 @@ def _sorted_out(
         elif s < BLURRED * np.median(sharp):
             reasons[photo.name] = f"blurred: {100 * s / np.median(sharp):.0f} % of the others' sharpness"
     if len(photos) < MIN_PHOTOS:
-        raise InputError(
-            f"{photos[0].path.parent}: holds {len(photos)} of the {MIN_PHOTOS} photos that are the fewest; take 30 or more"
-        )
+        few = f"holds {len(photos)} different photos, fewer than {MIN_PHOTOS}; take 30 or more"
+        raise InputError(f"{photos[0].path.parent}: {few}")
     if len(reasons) == len(photos):
         raise InputError(f"{photos[0].path.parent}: all photos are too dark; expose them longer")
     return [photo for photo in photos if photo.name not in reasons], reasons
