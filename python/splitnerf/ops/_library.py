@@ -8,6 +8,7 @@ import inspect
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -136,7 +137,10 @@ def refuse_gradients(ctx, op: str, **arguments: int) -> None:
             raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
 
 
-def front(n_rows: int = 1, **own: int) -> Callable[[Callable], Callable]:
+Function = TypeVar("Function", bound=Callable)  # type checkers see the signature of what is decorated
+
+
+def front(n_rows: int = 1, **own: int) -> Callable[[Function], Function]:
     """Decorates what the front page offers: an argument of a wrong type is named in one line, and rows may be arrays.
 
     Args:
@@ -145,7 +149,7 @@ def front(n_rows: int = 1, **own: int) -> Callable[[Callable], Callable]:
             dimensions. All may then have the same further dimensions, [2, 5, 3] in place of [10, 3], and so do the results.
     """
 
-    def decorate(function: Callable) -> Callable:
+    def decorate(function: Function) -> Function:
         signature = inspect.signature(function)
         name, names = function.__name__, list(signature.parameters)
         first, n_own = next(iter(own.items()), (names[0], None))
