@@ -68,6 +68,7 @@ def random_scene(seed: int, folder: Path) -> Drawn:
         layout=pick(("blender", "blender", *WRITERS)),
         seed=seed,
     )
+    fault = fault if settings.layout == "blender" else "none"
     if built_in:
         parts = [pick(SHAPES)]
         asset = shape_asset(parts[0], pick(MATERIALS), 48)
