@@ -110,7 +110,7 @@ def reconstruct(
         check_run(run, resume=resume, overwrite=overwrite)
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
         config = for_turntable(config) if dataset.light_turns is not None else config
-        config = without_fine_levels(dataset, config)
+        config = config if resume else without_fine_levels(dataset, config)
         training = Training(dataset, config, run, torch.device(device), observer)
         training.begin(resume)
         begin_run(run, config, dataset, overwrite)
