@@ -327,10 +327,9 @@ def test_the_scale_of_scores_keeps_the_digits_that_count():
     assert scales == ["good from 30 dB, poor below 25 dB", "good up to 0.08 off, poor above 0.16 off"]
 
 
-def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball, monkeypatch):
+def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):
     """A white ball casts a shadow on grey ground, and no two lights look alike."""
-    monkeypatch.setattr("splitnerf_tools.report.run.RELIT_SIDE", 96)
-    pictures = dict(relit_pictures(with_textures(ball, albedo_texture=np.ones((64, 64, 3), np.float32))))
+    pictures = dict(relit_pictures(with_textures(ball, albedo_texture=np.ones((64, 64, 3), np.float32)), 96))
     assert set(pictures) <= set(STUDIO_LIGHTS) and len(pictures) == 3
     ground = linear_to_srgb(np.float32([RELIT_GREY]))[0]
     beside = np.hypot(*(np.indices((96, 96)) - 47.5)) > 48 / MARGIN + 2
