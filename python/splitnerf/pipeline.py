@@ -371,10 +371,8 @@ def export_run(
 def write_origin(out: Path, run: Path, exported: Exported) -> None:
     """Writes where the data's world is in the files of an export, if it is not as they are."""
     known = np.array(read_json(run / ORIGIN, "origin")["origin"] if (run / ORIGIN).is_file() else [0.0, 0.0, 0.0])
-    origin, meaning = (
-        known + exported.origin,
-        "divide positions by the scale and add the origin to get those of the data",
-    )
+    origin = known + exported.origin
+    meaning = "divide positions by the scale and add the origin to get those of the data"
     if origin.any() or exported.scale != 1:
         write_json(out / ORIGIN, {"origin": origin.tolist(), "scale": exported.scale, "meaning": meaning})
     else:

@@ -1,10 +1,11 @@
-"""Three assets that are hard to reconstruct, made of formulas: equal bytes every time.
+"""Assets that are hard to reconstruct, made of formulas: equal bytes every time.
 
     python tests/bench/hard_scenes.py OUT [--only knot] [--detail 1.0]
 
     knot    a dark lacquered torus knot, engraved: a glossy dielectric that reflects itself
     rings   rings of metal and enamel, linked: strong interreflection
     basket  a wire lantern with a painted ball in it: thin parts
+    brushed, wheel, porcelain, gilded, wires: see kinds.py
 
 Each becomes OUT/NAME.glb with one material and textures. Data sets are rendered from them with
 
@@ -23,38 +24,8 @@ import trimesh
 from splitnerf.export.writers import write_glb
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from bench.tubes import TAU, Field, Tube, assemble, lathe, ring, through  # noqa: E402
-
-
-def wire(radius: float) -> Field:
-    """A constant radius that falls to 0 at both ends."""
-    return lambda s, t: radius * np.sqrt(np.clip(np.minimum(s, 1 - s) / 0.01, 0, 1))
-
-
-def noise(s: np.ndarray, t: np.ndarray, along: int, around: int, seed: int) -> np.ndarray:
-    """Periodic noise in [0, 1] with frequencies up to `along` and `around`."""
-    draw = np.random.default_rng(seed)
-    waves = zip(draw.integers(-along, along + 1, 12), draw.integers(0, around + 1, 12), draw.uniform(0, 1, 12))
-    return 0.5 + 0.5 * np.tanh(sum(np.cos(TAU * (i * s + j * t + phase)) for i, j, phase in waves) / 3)
-
-
-def band(x: np.ndarray, width: float) -> np.ndarray:
-    """1 at whole x, 0 farther from them than about `width` / 3, with soft edges."""
-    return 1 - smooth((np.abs(np.sin(np.pi * x)) / width - 0.6) / 0.8)
-
-
-def smooth(x: np.ndarray) -> np.ndarray:
-    """A step from 0 to 1 as x goes from 0 to 1."""
-    x = np.clip(x, 0, 1)
-    return x * x * (3 - 2 * x)
-
-
-def mix(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Colours a to b, [..., 3]; each may be one colour."""
-    return np.asarray(a) * (1 - share[..., None]) + np.asarray(b) * share[..., None]
-
-
-# ---- scenes ----
+from bench.kinds import KINDS  # noqa: E402
+from bench.tubes import TAU, Tube, assemble, band, lathe, mix, noise, ring, smooth, through, wire  # noqa: E402
 
 
 def knot() -> list[Tube]:
@@ -179,13 +150,13 @@ def basket() -> list[Tube]:
     return [*tubes, Tube(*lathe(ball), majolica, (96, 128), 768)]
 
 
-SCENES = {"knot": knot, "rings": rings, "basket": basket}
+SCENES = {"knot": knot, "rings": rings, "basket": basket, **KINDS}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--only", choices=SCENES, help="one of the three")
+    parser.add_argument("--only", choices=SCENES, help="one of them")
     parser.add_argument("--detail", type=float, default=1.0, help="factor on the numbers of cells and texels")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """What Mitsuba 3 makes of the same start: it fits the textures and the light of a run's trained mesh to the photos.
 
-    python tests/bench/mitsuba_fit.py RUN DATA OUT --minutes 5 [--spp 16] [--rate 0.02]
+    python tests/bench/mitsuba_fit.py RUN DATA OUT --minutes 5 [--spp 16] [--rate 0.002]
 
 Needs `pip install mitsuba` and an LLVM library. Begins where the refinement of RUN began, at RUN/trained: mesh, textures and
 light. Each step renders one photo by `prb` (paths of at most four segments) and moves albedo, roughness, metallic and the light by Adam.
@@ -35,8 +35,11 @@ def scene_of(mi, asset, maps: dict[str, np.ndarray], light: np.ndarray):
     values.update()
     file = Path(tempfile.mkdtemp()) / "mesh.ply"
     mesh.write_ply(str(file))
-    bitmap = lambda image: {"type": "bitmap", "bitmap": mi.Bitmap(image.astype(np.float32)), "raw": True}  # noqa: E731
-    bsdf = {name: bitmap(image) for name, image in maps.items()} | {"type": "principled", "specular": 0.5}
+    bsdf = {
+        name: {"type": "bitmap", "bitmap": mi.Bitmap(image.astype(np.float32)), "raw": True}
+        for name, image in maps.items()
+    }
+    bsdf |= {"type": "principled", "specular": 0.5}
     return mi.load_dict(
         {
             "type": "scene",
@@ -80,7 +83,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--spp", type=int, default=16)
-    parser.add_argument("--rate", type=float, default=0.02)
+    parser.add_argument("--rate", type=float, default=0.002)
     args = parser.parse_args()
     import drjit as dr
     import mitsuba as mi
@@ -123,15 +126,17 @@ def main() -> None:
         step += 1
         if step % 20 == 0:
             print(f"step {step}, {time.monotonic() - began:.0f} s, error {float(loss.array[0]):.5f}", flush=True)
-    found = {name: np.array(optimiser[name]) for name in names}
-    value = lambda key: next(x for name, x in found.items() if key in name)  # noqa: E731
+    found = {
+        key: np.array(optimiser[next(name for name in names if name.endswith(f"{key}.data"))])
+        for key in (*maps, "light")
+    }
     args.out.mkdir(parents=True, exist_ok=True)
-    surface = np.concatenate([value("roughness"), value("metallic")], axis=2)
+    surface = np.concatenate([found["roughness"], found["metallic"]], axis=2)
     fitted = replace(
-        material, albedo_texture=value("base_color"), roughness_metallic_texture=surface, normal_texture=None
+        material, albedo_texture=found["base_color"], roughness_metallic_texture=surface, normal_texture=None
     )
     write_glb(args.out / "mesh.glb", replace(asset, materials=[fitted], tangents=None))
-    write_image(args.out / "environment.exr", value("light.data")[:, : light.shape[1], :3])
+    write_image(args.out / "environment.exr", found["light"][:, : light.shape[1], :3])
 
 
 if __name__ == "__main__":

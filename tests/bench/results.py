@@ -1,9 +1,10 @@
 """Whole reconstructions with their scores: pages of docs/benchmarks, made by `splitnerf` alone.
 
-    python tests/bench/results.py [shapes|scenes|time ...] [--list] [--work runs/results]
+    python tests/bench/results.py [shapes|scenes|kinds|time ...] [--list] [--work runs/results]
 
     shapes    eight hollow shapes in three materials, 4 minutes each
     scenes    objects with full truth, 30 minutes each
+    kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
     time      error against time: half a minute to 30 minutes, two objects, two seeds
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
@@ -22,6 +23,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import read_json
 from splitnerf.files import atomic_path
@@ -29,6 +32,9 @@ from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
 from splitnerf_tools.demo.scene import build_environment
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from bench.kinds import KINDS  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))
@@ -50,6 +56,11 @@ HARD = {  # the light of the photos; three others relight it
     "knot": "lebombo_1k.hdr",
     "rings": "christmas_photo_studio_07_1k.hdr",
     "basket": "potsdamer_platz_1k.hdr",
+    "brushed": "blender_interior.exr",
+    "wheel": "blender_courtyard.exr",
+    "porcelain": "potsdamer_platz_1k.hdr",
+    "gilded": "blender_forest.exr",
+    "wires": "lebombo_1k.hdr",
 }
 RELIGHTS = "blender_city.exr", "blender_sunset.exr", "kloppenheim_05_1k.hdr"
 Row = dict[str, str]
@@ -64,13 +75,15 @@ class Page:
     minutes: tuple[float, ...]
     size: int
     seeds: int = 1
+    pictures: bool = False
 
 
 PAGES = {
     "shapes": Page(
         "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (4,), 120
     ),
-    "scenes": Page("Objects", ("boombox", "avocado", "corset", "teapot", *HARD), (30,), 200),
+    "scenes": Page("Objects", ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket"), (30,), 200),
+    "kinds": Page("Unseen kinds", tuple(KINDS), (8,), 100, pictures=True),
     "time": Page("Error against time", ("boombox", "knot"), (0.5, 1, 2, 4, 8, 15, 30), 200, 2),
 }
 
@@ -124,7 +137,15 @@ def rows_of(scene: str, minutes: float, seed: int, page: Page, work: Path) -> li
             return []
         key = scene, f"{minutes:g}", str(seed), f"{page.size}", os.environ.get("OMP_NUM_THREADS", "all"), asset
         rows.append(dict(zip(KEYS, key)) | scored(read_json(scores, "novel_view"), commit))
+    if page.pictures:
+        (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
+        splitnerf("evaluate", run, "--data", data, "--spp", 64, "--views", 1, "--sheet", sheet)
     return rows
+
+
+def sheet_of(scene: str, work: Path) -> Path:
+    """The pictures of the newest run of a scene."""
+    return work / f"{scene.replace(' ', '_')}.png"
 
 
 def scored(evaluation: dict, commit: str) -> Row:
@@ -147,7 +168,7 @@ def read_rows(path: Path) -> list[Row]:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-def write_page(out: Path, name: str, rows: list[Row]) -> None:
+def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     """Writes NAME.csv and NAME.md; the head names the commit of the oldest row, from which the page is stale."""
     page, oldest = PAGES[name], min(rows, key=lambda row: row["date"])
     facts = provenance(SOURCES, f"make results PAGE={name}") | {"commit": oldest["commit"], "date": oldest["date"][:10]}
@@ -158,6 +179,11 @@ def write_page(out: Path, name: str, rows: list[Row]) -> None:
     if name == "time":
         draw(out / f"{name}.png", rows)
         lines += [f"![Relit views and albedo against minutes]({name}.png)", ""]
+    if page.pictures:
+        sheets = [sheet_of(scene, work) for scene in dict.fromkeys(row["scene"] for row in rows)]
+        pictures = [np.asarray(Image.open(sheet).convert("RGB")) for sheet in sheets if sheet.is_file()]
+        Image.fromarray(np.concatenate(pictures, axis=1)).reduce(2).save(out / f"{name}.jpg", quality=80)
+        lines += [f"![A view of each: truth, prediction, four times the error]({name}.jpg)", ""]
     lines += [
         "*trained* is what training alone exports, *refined* what a run delivers; the minutes are those of both. Scores are defined in",
         "[results](../results.md#how-scores-are-defined); relit views are path traced by the program.",
@@ -249,7 +275,7 @@ def main() -> int:
                                 r["asset"] == "refined",
                             )
                         )
-                        write_page(args.out, name, rows)
+                        write_page(args.out, name, rows, args.work)
     print(f"{total:g} minutes of training" + (" are missing" if args.list else ""))
     return int(failed)
 

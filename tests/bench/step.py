@@ -99,15 +99,7 @@ def _timed(body) -> float:
 def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int) -> dict | None:
     """What a process of its own measures; None where the processor has no such instruction set."""
     environment = os.environ | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
-    words = [
-        *os.environ.get("STEP_PYTHON", sys.executable).split(),
-        __file__,
-        run,
-        data,
-        "--steps",
-        str(n_steps),
-        "--measure",
-    ]
+    words = [sys.executable, __file__, run, data, "--steps", str(n_steps), "--measure"]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"{isa}, {threads} threads: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)

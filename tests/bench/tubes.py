@@ -143,3 +143,31 @@ def lathe(profile: np.ndarray) -> tuple[Curve, Field]:
         return centre, np.broadcast_to([1.0, 0, 0], centre.shape), np.broadcast_to([0, 1.0, 0], centre.shape)
 
     return curve, lambda s, t: np.interp(s, steps, profile[:, 0])
+
+
+def wire(radius: float) -> Field:
+    """A constant radius that falls to 0 at both ends."""
+    return lambda s, t: radius * np.sqrt(np.clip(np.minimum(s, 1 - s) / 0.01, 0, 1))
+
+
+def noise(s: np.ndarray, t: np.ndarray, along: int, around: int, seed: int) -> np.ndarray:
+    """Periodic noise in [0, 1] with frequencies up to `along` and `around`."""
+    draw = np.random.default_rng(seed)
+    waves = zip(draw.integers(-along, along + 1, 12), draw.integers(0, around + 1, 12), draw.uniform(0, 1, 12))
+    return 0.5 + 0.5 * np.tanh(sum(np.cos(TAU * (i * s + j * t + phase)) for i, j, phase in waves) / 3)
+
+
+def band(x: np.ndarray, width: float) -> np.ndarray:
+    """1 at whole x, 0 farther from them than about `width` / 3, with soft edges."""
+    return 1 - smooth((np.abs(np.sin(np.pi * x)) / width - 0.6) / 0.8)
+
+
+def smooth(x: np.ndarray) -> np.ndarray:
+    """A step from 0 to 1 as x goes from 0 to 1."""
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)
+
+
+def mix(a: np.ndarray, b: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Colours a to b, [..., 3]; each may be one colour."""
+    return np.asarray(a) * (1 - share[..., None]) + np.asarray(b) * share[..., None]

@@ -5,11 +5,13 @@ import io
 import json
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
+import pycolmap
 import pytest
 import torch
 from PIL import Image
@@ -33,7 +35,7 @@ from splitnerf_tools.capture.photographs import (
     write_png,
 )
 from splitnerf_tools.capture.photometry import find_exposures
-from splitnerf_tools.capture.poses import Lens, Reconstruction
+from splitnerf_tools.capture.poses import Lens, Reconstruction, _counted
 from splitnerf_tools.capture.prepare import PrepareSettings, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -420,3 +422,22 @@ def test_many_photos_without_a_camera_are_told_of(tmp_path, capsys, placed, told
     assert list(_without_camera(photos, list(placed), tmp_path)) == sorted(set("abcdefghij") - set(placed))
     said = capsys.readouterr().err
     assert ("3 of 10 photos do not fit together" in said) == told and len(said.splitlines()) == told
+
+
+def test_rows_are_counted_while_colmap_writes_them(tmp_path):
+    """COLMAP keeps the database open, in this process."""
+    file, told, seen = tmp_path / "features.db", {}, threading.Event()
+
+    def report(share):
+        told[share] = True
+        if share == wanted:
+            seen.set()
+
+    database, wanted = pycolmap.Database.open(file), 0.0
+    with _counted(file, "cameras", 4, report):
+        for n in range(1, 6):
+            database.write_camera(pycolmap.Camera(model="SIMPLE_PINHOLE", width=8, height=6, params=[9.0, 4, 3]))
+            wanted = min(1.0, n / 4)
+            seen.clear()
+            assert seen.wait(30), (wanted, list(told))
+    database.close()

@@ -20,6 +20,7 @@ from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.writers import write_glb
 from splitnerf.relight.cameras import MARGIN
 from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light
+from splitnerf_tools.report import run as report_run
 from splitnerf_tools.report import write_report
 from splitnerf_tools.report.drawings import curve_data, line_chart
 from splitnerf_tools.report.embedding import data_uri, script_json
@@ -329,7 +330,7 @@ def test_the_scale_of_scores_keeps_the_digits_that_count():
 
 def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):
     """A white ball casts a shadow on grey ground, and no two lights look alike."""
-    pictures = dict(relit_pictures(with_textures(ball, albedo_texture=np.ones((64, 64, 3), np.float32)), 96))
+    pictures = dict(relit_pictures(with_textures(ball, albedo_texture=np.ones((64, 64, 3), np.float32)), 48))
     assert set(pictures) <= set(STUDIO_LIGHTS) and len(pictures) == 3
     ground = linear_to_srgb(np.float32([RELIT_GREY]))[0]
     beside = np.hypot(*(np.indices((96, 96)) - 47.5)) > 48 / MARGIN + 2
@@ -338,6 +339,12 @@ def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):
         print(name, shown.min(), shown.max(), ground)
         assert shown.max() == pytest.approx(ground, abs=0.01) and shown.min() < 0.85 * ground, name
     assert min(np.abs(pictures[a] - pictures[b]).mean() for a, b in (("studio", "sunny"), ("studio", "sunset"))) > 0.01
+
+
+@pytest.mark.parametrize("photo, side", [(8, 16), (100, 32)])
+def test_pictures_under_other_lights_are_at_most_twice_as_large_as_the_photos(ball, monkeypatch, photo, side):
+    monkeypatch.setattr(report_run, "RELIT_SIDE", 32)
+    assert {picture.shape for _, picture in relit_pictures(ball, photo)} == {(side, side, 3)}
 
 
 def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):

@@ -12,8 +12,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# The paper's settings, where it states them, and ours where it does not: tests/python/test_config.py names each
-# number's
+# The paper's settings, where it states them, and ours where it does not: tests/python/test_config.py names each number's
 # source. Shares of the run stand for 20,000 steps.
 PAPER = dict(
     run=dict(preset="paper", steps=20000),
@@ -81,12 +80,10 @@ PAPER = dict(
     ),
 )
 
-# The CPU's method with the samples, the levels and the meshes of a GPU.
+# The CPU's method with the samples, the levels (16 to 1024 cells) and the meshes of a GPU.
 FAST = dict(
     run=dict(preset="fast", steps=20000, cuda_graphs=True),
-    surface=dict(
-        n_levels=16, growth=1.3195079, least_cell=0.0, log2_table_size=19, table_dtype="float16"
-    ),  # to 1024 cells
+    surface=dict(n_levels=16, growth=1.3195079, least_cell=0.0, log2_table_size=19, table_dtype="float16"),
     mesh=dict(resolution=192, background=True),
     sampling=dict(max_rays=16384, target_samples=32768, grid_resolution=128),
     export=dict(texture_size=2048),

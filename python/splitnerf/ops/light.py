@@ -102,7 +102,6 @@ register("sample_ggx_lobe", fake=lambda axes, roughness, n_samples, seed: axes.n
 
 
 SH_COEFFICIENTS = 169  # degrees 0 to 12
-COARSEST_AVERAGE = 8  # texels along an edge of the coarsest averages
 
 
 class SparseRows(NamedTuple):
@@ -214,10 +213,11 @@ def light_filters(resolution: int, targets: list[tuple[int, float]]) -> SparseMa
 
     Source: SplitNeRF Eq. (11).
     """
-    averaged = [resolution >> k for k in range(resolution.bit_length() - COARSEST_AVERAGE.bit_length() + 1)]
-    return sparse_map(
-        [_core.light_filter(resolution, m, rho) for m, rho in targets], ([m for m, _ in targets], averaged)
-    )
+    parts = [_core.light_filter(resolution, m, rho) for m, rho in targets]
+    averaged = [resolution]
+    while sum(side * side for side in averaged) < parts[0][3]:
+        averaged.append(averaged[-1] // 2)
+    return sparse_map(parts, ([m for m, _ in targets], averaged))
 
 
 def sh_projection(resolution: int, cells: bool) -> Tensor:
@@ -237,7 +237,7 @@ def zonal_factors(start: float, n_rows: int) -> Tensor:
 def sparse_product(matrix: SparseMap, values: Tensor) -> Tensor:
     """The product of a matrix with values [columns, 3] -> [rows, 3]. Differentiable in ``values``, any number of times.
 
-    Column indices are not checked: they come from the functions above.
+    On the CPU indices are checked to lie in range. That ``places`` name each row once is not: the maps above do.
     """
     return lib.sparse_product(*matrix.rows, *matrix.transposed, values)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import sqlite3
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +22,13 @@ MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
 BLOCK = 8  # photos whose matches are written at once, so that the progress moves
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
+COUNT = """
+import contextlib, sqlite3, sys, time
+while True:
+    with contextlib.suppress(sqlite3.Error), sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True, timeout=0.1) as base:
+        print(base.execute(f"SELECT COUNT(*) FROM {sys.argv[2]}").fetchone()[0], flush=True)
+    time.sleep(1)
+"""  # prints a number a second
 MIN_PHOTOS = 3
 FEW = 10  # photos up to which points that two of them show are kept
 ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
@@ -232,25 +240,25 @@ def _quiet() -> Iterator[None]:
 
 
 @contextmanager
-def _counted(
-    database: Path, table: str, total: int, report: Callable[[float], None], every: float = 1.0
-) -> Iterator[None]:
-    """Reports the share of a table's rows while a step of COLMAP fills it."""
-    done = threading.Event()
+def _counted(database: Path, table: str, total: int, report: Callable[[float], None]) -> Iterator[None]:
+    """Reports the share of a table's rows while a step of COLMAP fills it. A process of its own counts them: two copies of
+    SQLite in one process lose each other's locks on a file."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", COUNT, str(database), table],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
 
     def watch() -> None:
-        while not done.wait(every):
-            try:
-                with sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=0.1) as base:
-                    rows = base.execute(f"SELECT COUNT(*) FROM {table}").fetchone()[0]  # noqa: S608
-            except sqlite3.Error:
-                continue
-            report(min(1.0, rows / max(total, 1)))
+        for rows in child.stdout:
+            report(min(1.0, int(rows) / max(total, 1)))
 
     thread = threading.Thread(target=watch, daemon=True)
     thread.start()
     try:
         yield
     finally:
-        done.set()
+        child.kill()
+        child.wait()
         thread.join()

@@ -31,7 +31,7 @@ from splitnerf_tools.report.grades import graded
 from splitnerf_tools.report.html import write_report
 
 RELIT = ("studio", "sunny", "sunset")
-RELIT_SIDE, RELIT_SPP, RELIT_GREY = 384, 64, 0.7  # at most: photos of a few pixels need no more than twice as many
+RELIT_SIDE, RELIT_SPP, RELIT_GREY = 384, 64, 0.7
 ROUGHNESS = (0.0, 0.25, 0.5, 1.0)  # of the light's panels
 
 
@@ -48,7 +48,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         truth = {key: value for key, value in vars(truths[i]).items() if key != "name"}
         truth |= {"rgb": views.images[i, ..., :3], "alpha": views.images[i, ..., 3]}
         pages.append({"name": views.frame_names[i], "truth": truth, "prediction": prediction})
-    light, side = run / "environment.exr", min(RELIT_SIDE, 2 * max(views.height, views.width))
+    light, photo = run / "environment.exr", max(views.height, views.width)
     write_report(
         run / "report.html",
         title=run.resolve().name,
@@ -62,7 +62,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         timings=timings,
         light=read_environment(light) if light.is_file() else None,
         asset=run / "mesh.glb",
-        relit=relit_pictures(read_asset(run / "mesh.glb"), side) if (run / "mesh.glb").is_file() else [],
+        relit=relit_pictures(read_asset(run / "mesh.glb"), photo) if (run / "mesh.glb").is_file() else [],
         albedo_scale=evaluated.scores["albedo"] and evaluated.scores["albedo"]["lsq"]["scale"],
     )
 
@@ -86,8 +86,11 @@ def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: l
     return {"views": pages, "summary": scores["refinement"], "lights": lights}
 
 
-def relit_pictures(asset: Asset, side: int) -> list[tuple[str, np.ndarray]]:
-    """The asset path traced on a grey ground under lights that the program makes: name and [side, side, 3] sRGB."""
+def relit_pictures(asset: Asset, photo: int) -> list[tuple[str, np.ndarray]]:
+    """The asset path traced on a grey ground under lights that the program makes: name and [side, side, 3] sRGB.
+
+    Photos of ``photo`` pixels carry no more than pictures of twice as many."""
+    side = min(RELIT_SIDE, 2 * photo)
     renderer, view, pictures = AssetRenderer(asset), turntable(asset, 1, size=(side, None))[0], []
     for name in RELIT:
         images = renderer.render(

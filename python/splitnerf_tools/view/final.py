@@ -20,20 +20,9 @@ from splitnerf_tools.view.assets import ViewedAssets
 FIRST_SIDE = 256  # pixels of the first picture's longer side
 LARGEST_SIDE, MOST_PIXELS = 4096, 1 << 22
 PATHS_A_CALL = 1 << 16  # so that a call of the tracer ends soon after the camera moves
-PASSES = (
-    1,
-    1,
-    2,
-    4,
-    8,
-    16,
-    32,
-    64,
-    128,
-    256,
-    512,
-)  # paths a pixel of the pictures of the whole size, each with those before it
-MOST_PATHS = 1024  # their sum
+# Paths a pixel of the pictures of the whole size, each with those before it.
+PASSES = (1, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+MOST_PATHS = sum(PASSES)
 
 
 @dataclass(frozen=True)
@@ -117,9 +106,8 @@ class Tracer:
 
     def __init__(self, shown: ViewedAssets):
         self._shown = shown
-        self._renderers: dict[
-            int, tuple[Asset, AssetRenderer, float]
-        ] = {}  # of the newest asset of each number, and its ground
+        # Of the newest asset of each number, and its ground.
+        self._renderers: dict[int, tuple[Asset, AssetRenderer, float]] = {}
         self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
 
     def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:

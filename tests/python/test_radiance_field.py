@@ -1,0 +1,84 @@
+"""The radiance field of a whole place: its parts by closed forms."""
+
+import pytest
+import torch
+from splitnerf_tools.separation.field import (
+    RadianceField,
+    RayMeasure,
+    Rendered,
+    contracted,
+    resampled,
+    search_loss,
+    spread_loss,
+    with_less_gradient,
+)
+
+
+def rendered(weights, edges, first_weights=None, first_edges=None):
+    weights, edges = torch.tensor([weights]), torch.tensor([edges])
+    first = (
+        (weights if first_weights is None else torch.tensor([first_weights])),
+        (edges if first_edges is None else torch.tensor([first_edges])),
+    )
+    return Rendered(torch.zeros(1, 3), weights, edges[:, 1:], edges, *first)
+
+
+def test_contraction():
+    inside = torch.tensor([[0.3, -0.2, 0.5]])
+    assert torch.equal(contracted(inside), inside)
+    far = contracted(torch.tensor([[0.0, 4.0, 0.0], [1e6, 0, 0]]))
+    torch.testing.assert_close(far, torch.tensor([[0.0, 1.75, 0.0], [2.0, 0, 0]]))
+
+
+def test_steps_are_even_near_the_middle_and_grow_with_the_distance():
+    measure = RayMeasure(torch.tensor([[3.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]]))
+    distances = measure.distances(torch.linspace(0, 1, 401)[None])[0]
+    torch.testing.assert_close(distances[[0, -1]], torch.tensor([0.1, 300.0]), rtol=1e-4, atol=1e-4)
+    steps = distances.diff()
+    assert (steps > 0).all() and abs(float(distances[steps.argmin()]) - 3) < 0.05
+    assert steps[-1] > 100 * steps.min()
+
+
+def test_samples_go_where_the_weights_are():
+    edges = torch.linspace(0, 1, 65)[None]
+    even = resampled(edges, torch.full((1, 64), 1 / 64), 16, False)
+    torch.testing.assert_close(even, torch.linspace(0, 1, 17)[None], atol=1e-5, rtol=0)
+    weights = torch.zeros(1, 64)
+    weights[0, 40] = 1
+    found = resampled(edges, weights, 32, False)
+    assert (found.diff() >= 0).all() and found[0, 0] == 0 and found[0, -1] == 1
+    assert ((found > edges[0, 39]) & (found < edges[0, 42])).sum() > 28
+
+
+def test_spread_of_two_weights():
+    """Halves that fill [0, 0.1] and [0.8, 1]: 2 w1 w2 0.85 + (w1^2 0.1 + w2^2 0.2) / 3."""
+    loss = spread_loss(rendered([0.5, 0.0, 0.5], [0.0, 0.1, 0.8, 1.0]))
+    assert float(loss) == pytest.approx(0.5 * 0.85 + 0.25 * 0.3 / 3)
+
+
+def test_search_must_bound_the_samples():
+    good = rendered([0.5, 0.5], [0.2, 0.3, 0.4], [0.0, 1.0, 0.0], [0.0, 0.1, 0.5, 1.0])
+    bad = rendered([0.5, 0.5], [0.2, 0.3, 0.4], [0.9, 0.1, 0.0], [0.0, 0.1, 0.5, 1.0])
+    assert float(search_loss(good)) == 0
+    assert float(search_loss(bad)) == pytest.approx(2 * 0.4**2 / 0.5, rel=1e-5)
+
+
+def test_gradients_fall_near_the_camera():
+    values = torch.ones(1, 3, 1, requires_grad=True)
+    out = with_less_gradient(values, torch.tensor([[0.15, 0.75, 3.0]]))
+    assert torch.equal(out, values)
+    out.sum().backward()
+    torch.testing.assert_close(values.grad[0, :, 0], torch.tensor([0.01, 0.25, 1.0]))
+
+
+def test_weights_sum_to_one_and_hidden_space_has_none():
+    torch.manual_seed(0)
+    field, o, d = RadianceField(), torch.tensor([[3.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]])
+    with torch.no_grad():
+        field.trunk[2].bias[0] = 8.0  # fog everywhere
+        fog = field.render(o, d, 32, 16)
+        behind = field.render(o, d, 32, 16, hidden=lambda points: points[..., 0] > 0)
+    assert float(fog.weights.sum()) == pytest.approx(1, abs=1e-5)
+    assert float(fog.distances[0, fog.weights.argmax()]) < 1
+    assert float(behind.weights.sum()) == pytest.approx(1, abs=1e-5)
+    assert float(behind.distances[0, behind.weights.argmax()]) > 3
