@@ -111,10 +111,11 @@ def light(height: int = 48) -> plt.Figure:
     shown = [("rho = 0", sky.numpy())]
     for rho in values:
         rough = torch.full((len(asked), 1), rho, dtype=torch.float64)
+        # The texels are not spread evenly: each counts by its solid angle.
         weighted, plain = (
             ops.prefilter_light(asked, rough, light_dirs=around, light=x)
             for x in (sky.reshape(-1, 3) * areas, areas.expand(-1, 3))
-        )  # the texels are not spread evenly: each counts by its solid angle
+        )
         shown.append((f"rho = {rho:g}", (weighted / plain).reshape(height, 2 * height, 3).numpy()))
     for axis, (title, picture) in zip(axes, shown):
         axis.imshow(ops.linear_to_srgb(torch.from_numpy(np.clip(picture, 0, 1))).numpy())

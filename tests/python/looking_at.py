@@ -14,9 +14,8 @@ import splitnerf_tools
 SOURCES = Path(splitnerf_tools.__file__).parent / "pages"
 LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-assert (SOURCES / "package.json").is_file(), (
-    f"the sources of the pages are not in {SOURCES}"
-)  # else all would be skipped
+# Else all would be skipped.
+assert (SOURCES / "package.json").is_file(), f"the sources of the pages are not in {SOURCES}"
 needs_chromium = pytest.mark.skipif(
     not (shutil.which("node") and CHROMIUM and (SOURCES / "node_modules/playwright-core").is_dir()),
     reason="needs node, chromium and `make viewer`",

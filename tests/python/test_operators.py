@@ -129,10 +129,8 @@ OTHERS = [
     ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
     ("gradient_losses", short_gradients),
     *(
-        (
-            "sdf_field",
-            lambda t, n=n, n_active=n_active: (*(x := sdf_field_inputs(n, t))[:13], n_active, x[14]),
-        )  # tiles of 64 points
+        # Tiles of 64 points.
+        ("sdf_field", lambda t, n=n, n_active=n_active: (*(x := sdf_field_inputs(n, t))[:13], n_active, x[14]))
         for n, n_active in ((1, 3), (63, 0), (64, 3), (65, 2), (1500, 3))
     ),
     *(

@@ -47,11 +47,8 @@ def factor(config: Config, step: int) -> float:
         # then lr(p) = f^((p - w) / (1 - w)) after a warm-up of the share w: equal factors in equal times, f at the end
         (200, 1000, {200: 1.0, 400: 0.01**0.25, 401: 0.01 ** (201 / 800), 600: 0.1, 800: 0.01**0.75, 1000: 0.01}),
         (0, 100, {0: 1.0, 50: 0.1, 100: 0.01}),
-        (
-            80,
-            100,
-            {0: 1 / 80, 49: 50 / 80, 75: 76 / 80 * 0.1, 100: 0.01},
-        ),  # the decay begins at half of the run at the latest
+        # The decay begins at half of the run at the latest.
+        (80, 100, {0: 1 / 80, 49: 50 / 80, 75: 76 / 80 * 0.1, 100: 0.01}),
     ],
 )
 def test_the_rate_warms_up_and_decays(warmup, steps, expected):

@@ -332,9 +332,8 @@ def test_what_the_controls_say(seen):
     texts = seen[0]["texts"]
     assert texts["saved"] == "mine.png"
     length, pixels_wide = texts["bar"]
-    focal = 220 / np.tan(
-        HALF_FIELD
-    )  # the picture is 440 pixels high; the ball's middle is 1.1 / sin of the half field away
+    # The picture is 440 pixels high; the ball's middle is 1.1 / sin of the half field away.
+    focal = 220 / np.tan(HALF_FIELD)
     assert pixels_wide == pytest.approx(float(length) * focal * np.sin(HALF_FIELD) / 1.1, abs=2) and pixels_wide <= 90
     assert texts["reset"] == "0" and texts["greyed"] == [True, True] and texts["untouched"] == ["0", False]
     for words in ("(b)", "([ ]); a double click resets it", "(f)", "(w)"):

@@ -19,10 +19,8 @@ from splitnerf.data.lens import pixel_width
 from splitnerf.export.bake import Texels, nearest_rows, rasterise
 
 PATCH_PIXELS = 2.0  # width of a patch, in pixels of the photos
-SEAM_REACH, SEAM_CANDIDATES = (
-    2.0,
-    12,
-)  # of a texel across a seam, in widths of a texel; texels among which it is searched
+# Of a texel across a seam, in widths of a texel; texels among which it is searched.
+SEAM_REACH, SEAM_CANDIDATES = 2.0, 12
 SEAM_COSINE = 0.7  # least cosine of the normals on both sides of a seam: the two sides of a sheet are no neighbours
 MIN_COSINE = 1e-3  # of a shading normal and the direction to the viewer
 N_CHANNELS = 8  # albedo 3, roughness, metallic, tangent-space normal 3

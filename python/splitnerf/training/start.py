@@ -36,10 +36,8 @@ NEAR_CELLS = 4.0  # from the surface to the points at which the field is compare
 POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
-CLEAR_SHARE, CLEAR_SHARE_FINE = (
-    0.25,
-    0.4,
-)  # of the object's pixels that must be clear; finer windows are clear by chance, too
+# Of the object's pixels that must be clear; finer windows are clear by chance, too.
+CLEAR_SHARE, CLEAR_SHARE_FINE = 0.25, 0.4
 FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing, and a sphere does as well or better
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells

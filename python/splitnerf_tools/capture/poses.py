@@ -32,10 +32,8 @@ while True:
 MIN_PHOTOS = 3
 FEW = 10  # photos up to which points that two of them show are kept
 ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
-MAX_ERROR, SHORTEST = (
-    2.0,
-    3,
-)  # pixels of reprojection and photos of a point beyond and below which the adjustment drops it
+# Pixels of reprojection and photos of a point beyond and below which the adjustment drops it.
+MAX_ERROR, SHORTEST = 2.0, 3
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height

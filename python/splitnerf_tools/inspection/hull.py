@@ -127,9 +127,8 @@ class _Votes:
         if len(depth) == 0:
             return filled
         filled[y, x] = True
-        footprint = (
-            2 * round(view.intrinsics[0] * self.cell / float(np.median(depth)) / 2) + 1
-        )  # odd, about a cell's width
+        # Odd, about a cell's width.
+        footprint = 2 * round(view.intrinsics[0] * self.cell / float(np.median(depth)) / 2) + 1
         return ndimage.binary_dilation(filled, np.ones((footprint, footprint))) & view.known
 
     def agreement(self, members: np.ndarray, share: float) -> np.ndarray:

@@ -101,9 +101,8 @@ def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.
     others = (weights > 0) & ~over
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0
     least = max(LEAST_HEIGHT, NOISE * deviation)
-    heights = _smoothed(
-        medians.clip(0.0, 2 * least), weights
-    )  # the edge is half of the way up, however high the object is there
+    # The edge is half of the way up, however high the object is there.
+    heights = _smoothed(medians.clip(0.0, 2 * least), weights)
     told = _smoothed(weights, np.ones_like(weights)) > SPARSE
     parts, _ = ndimage.label(((heights > least) & told) | (over & (counts == 0)))
     own = np.unique(parts[over & (parts > 0)])

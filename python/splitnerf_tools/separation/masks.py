@@ -25,10 +25,8 @@ COARSER = 4  # factor by which the first mask is smaller
 RIM = 3  # every other pixel beside a mask in which solid cells say nothing
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
 HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
-SPECK, FAINT = (
-    0.01,
-    0.1,
-)  # size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts
+# Size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts.
+SPECK, FAINT = 0.01, 0.1
 CONTRAST = 10.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
 UNDECIDED = 0.02  # a coarse pixel is decided where it and its neighbours are this near to 0 or to 1
 POINTS, DENSE = 5000, 80000  # pixels of a photo whose points are asked for, about: of all of it, and near the foot

@@ -132,9 +132,8 @@ def find_region(points: np.ndarray, table: Table | None, n_photos: int = 1) -> R
     taken = filled(taken) if table is None else down_to(table, filled(taken))
     grown = ndimage.binary_dilation(taken, np.ones((3, 3, 3)), iterations=GROWN)
     photo = np.repeat(np.arange(n_photos), -(-len(points) // n_photos))[: len(points)][chosen]
-    sights = np.unique(
-        np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo
-    )  # each photo once in a cell
+    # Each photo once in a cell.
+    sights = np.unique(np.ravel_multi_index(tuple(index.T), taken.shape) * n_photos + photo)
     seen_by = np.bincount(sights // n_photos, minlength=taken.size)
     return Region(grown, table, None, (seen_by.reshape(taken.shape) >= SEVERAL) & grown)
 

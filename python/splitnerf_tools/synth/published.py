@@ -42,9 +42,8 @@ class StanfordOrbWriter(ViewWriter):
         self._lights: dict[str | None, np.ndarray] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        self._lights[name] = (
-            super().light(environment) if name is None else environment
-        )  # the set's own file may round it
+        # The set's own file may round it.
+        self._lights[name] = super().light(environment) if name is None else environment
         return self._lights[name]
 
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
@@ -89,9 +88,8 @@ class NeusWriter(ViewWriter):
     def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
         number, (height, width) = len(self._matrices) // 2, maps["alpha"].shape
         focal = 0.5 * width / np.tan(0.5 * self.camera_angle_x)
-        k = np.array(
-            [[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]]
-        )  # the first pixel's middle is at 0
+        # The first pixel's middle is at 0.
+        k = np.array([[focal, 0, width / 2 - 0.5], [0, focal, height / 2 - 0.5], [0, 0, 1]])
         world = np.eye(4)
         world[:3] = k @ np.linalg.inv(pose @ OPENCV_AXES)[:3]
         self._matrices |= {f"world_mat_{number}": world, f"scale_mat_{number}": np.eye(4)}

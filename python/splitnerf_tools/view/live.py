@@ -26,11 +26,8 @@ STATE_EVERY = 0.5  # seconds between two states
 # least seconds between two surfaces, and the largest share of the time that they take
 ASSET_EVERY, ASSET_SHARE = 4.0, 0.05
 LIGHT_HEIGHT = 64  # rows of the light while it is recovered
-REQUESTS = {
-    "pause": Request.PAUSE,
-    "checkpoint": Request.SAVE,
-    "stop": Request.STOP,
-}  # of the buttons; "resume" takes one back
+# Of the buttons; "resume" takes one back.
+REQUESTS = {"pause": Request.PAUSE, "checkpoint": Request.SAVE, "stop": Request.STOP}
 ANSWERS = {"pause": "pauses until its page resumes it, or Ctrl-C ends it", "stop": "stops and exports"}
 CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
 

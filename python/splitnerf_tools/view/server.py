@@ -39,10 +39,8 @@ LARGEST_UPLOAD = 128 << 20  # bytes of a light
 LARGEST_QUESTION = 1 << 16  # bytes of a camera
 PICTURE = struct.Struct("<5I")  # asset, width, height, paths a pixel, bytes that follow
 WITHOUT_REST = ("", "scene.json", "final", "events")  # addresses that nothing follows
-FIRST_TIMEOUT, TIMEOUT = (
-    5.0,
-    60.0,
-)  # seconds: until the token of a connection is checked, and that it may be silent after
+# Seconds: until the token of a connection is checked, and that it may be silent after.
+FIRST_TIMEOUT, TIMEOUT = 5.0, 60.0
 MOST_OPEN = 64  # connections at a time: the run that is shown needs files too
 SAFETY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' blob: data:; "

@@ -44,6 +44,7 @@ OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter")  #
 # Keys that are used, or say nothing of pictures or cameras.
 OF_BOTH = {*FOCAL, *LENS, *OTHER_LENSES, "mask_kind", "gamma"}
 OF_FILE = OF_BOTH | {"frames", "train_filenames", "test_filenames", "val_filenames"}
+# The last three: a number of Blender's script, and two of instant-ngp's and nerfstudio's.
 OF_FRAME = OF_BOTH | {
     "file_path",
     "transform_matrix",
@@ -53,7 +54,7 @@ OF_FRAME = OF_BOTH | {
     "rotation",
     "sharpness",
     "colmap_im_id",
-}  # the last three: a number of Blender's script, and two of instant-ngp's and nerfstudio's
+}
 
 
 def present(root: Path) -> bool:
