@@ -4,6 +4,7 @@ import dataclasses
 import io
 import json
 import re
+import shutil
 import struct
 import zipfile
 
@@ -18,7 +19,7 @@ from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material, vertex_tangents
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, read_image, read_radiance
-from splitnerf.data.json_files import read_json
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.export.scene import write_assets, write_environment, write_mesh_ply
 from splitnerf.export.writers import write_glb, write_obj, write_usdz
 from splitnerf.fields import Light
@@ -247,6 +248,17 @@ def test_export_stands_the_asset_on_its_foot_at_its_height(tmp_path, run, capsys
     again = ["--out", str(tmp_path / "out"), "--formats", "ply", "--overwrite"]
     assert main(["export", str(run), *again]) == DONE
     assert not (tmp_path / "out" / "origin.json").exists()
+
+
+def test_export_scales_the_asset_and_adds_where_the_runs_own_world_is(tmp_path, run):
+    moved = shutil.copytree(run, tmp_path / "moved")
+    write_json(moved / "origin.json", {"origin": [10.0, 20.0, 30.0]})
+    size = ["--faces", "1000", "--texture-size", "64", "--formats", "ply", "--pivot", "foot", "--scale", "2"]
+    assert main(["export", str(moved), "--out", str(tmp_path / "out"), *size]) == DONE
+    full = trimesh.load(tmp_path / "out" / "mesh.ply", process=False)
+    placed = read_json(tmp_path / "out" / "origin.json", "origin")
+    assert placed["scale"] == 2 and np.ptp(full.vertices, axis=0) == pytest.approx(1.4, rel=0.2)
+    assert (full.vertices / 2 + placed["origin"]).mean(axis=0) == pytest.approx([11, 20, 28], abs=0.05)
 
 
 class ThreeLamps(Light):
