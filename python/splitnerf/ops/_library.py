@@ -69,13 +69,11 @@ def register(
     if gradients:
         backward, setup_context = _by_operator(name, gradients.split())
 
-    @functools.cache
-    def operator() -> torch._ops.OpOverload:
-        return getattr(torch.ops.splitnerf, name).default
+    operator = getattr(lib, name)
 
     def below_autograd(*arguments: object) -> object:
         with torch._C._AutoDispatchBelowAutograd():
-            return operator()(*arguments)
+            return operator(*arguments)
 
     def forward(ctx, *arguments):
         output = below_autograd(*arguments)
@@ -89,10 +87,12 @@ def register(
     methods = {"forward": staticmethod(forward), "backward": staticmethod(backward or refuse)}
     node = type(f"{name}_gradient", (torch.autograd.Function,), methods)
 
+    defaults = tuple(argument.default_value for argument in operator._schema.arguments)
+    places = _tensor_places(name)
+
     def differentiable(*arguments: object) -> object:
-        schema = operator()._schema.arguments  # the dispatcher leaves out what equals a default
-        arguments += tuple(argument.default_value for argument in schema[len(arguments) :])
-        tensors = [x for x in arguments if isinstance(x, Tensor)]
+        arguments += defaults[len(arguments) :]  # the dispatcher leaves out what equals a default
+        tensors = [x for i in places if (x := arguments[i]) is not None]
         if forward_ad._current_level >= 0 and any(forward_ad.unpack_dual(x).tangent is not None for x in tensors):
             raise RuntimeError(f"{name}: no forward derivative (jvp) is defined; see the table in docs/ops.md")
         if torch.is_grad_enabled() and any(x.requires_grad for x in tensors):
@@ -102,11 +102,17 @@ def register(
     _FRAGMENT.impl(name, differentiable, "Autograd")
 
 
+def _tensor_places(name: str) -> list[int]:
+    """Which arguments of an operator are tensors, or may be."""
+    return [i for i, argument in enumerate(getattr(lib, name)._schema.arguments) if "Tensor" in str(argument.type)]
+
+
 def _by_operator(name: str, to: Sequence[str]) -> tuple[Callable, Callable]:
     """The `backward` and `setup_context` of an operator whose gradients another one computes, which is registered."""
     names = [argument.name for argument in getattr(lib, name)._schema.arguments]
     places = [names.index(argument) for argument in to]
     others = {argument: i for i, argument in enumerate(names) if argument not in to}
+    tensors = _tensor_places(name)
 
     def fake(*arguments):
         first, of = arguments[0], [arguments[i] for i in places]
@@ -114,12 +120,16 @@ def _by_operator(name: str, to: Sequence[str]) -> tuple[Callable, Callable]:
         return found[0] if len(found) == 1 else tuple(found)
 
     def setup_context(ctx, inputs, output):
-        ctx.save_for_backward(*(x if isinstance(x, Tensor) else None for x in inputs))
-        ctx.numbers = [None if isinstance(x, Tensor) else x for x in inputs]
+        ctx.save_for_backward(*(inputs[i] for i in tensors))
+        ctx.inputs = list(inputs)
+        for i in tensors:
+            ctx.inputs[i] = None
 
     def backward(ctx, *grads):
         refuse_gradients(ctx, name, **others)
-        inputs = [number if x is None else x for x, number in zip(ctx.saved_tensors, ctx.numbers)]
+        inputs = ctx.inputs.copy()  # a graph that is kept goes backward again
+        for i, x in zip(tensors, ctx.saved_tensors):
+            inputs[i] = x
         found = getattr(lib, f"{name}_backward")(*inputs, *grads)
         result: list[Tensor | None] = [None] * len(names)
         for i, grad in zip(places, (found,) if isinstance(found, Tensor) else found):
@@ -132,8 +142,9 @@ def _by_operator(name: str, to: Sequence[str]) -> tuple[Callable, Callable]:
 
 def refuse_gradients(ctx, op: str, **arguments: int) -> None:
     """Raises RuntimeError where an argument without a defined gradient requires one; ``arguments``: name = position."""
+    needed = ctx.needs_input_grad
     for name, position in arguments.items():
-        if ctx.needs_input_grad[position]:
+        if needed[position]:
             raise RuntimeError(f"{op}: no gradient to {name} is defined; see the table in docs/ops.md")
 
 
