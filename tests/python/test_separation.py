@@ -417,6 +417,19 @@ class TestMirrors:
         assert found[30:60, 42:68].min() == 1 and torch.equal(found[:, :12], mask[:, :12]) and found[:, 76:].max() == 0
         assert torch.equal(with_mirrors(mask, Region(np.zeros((CELLS,) * 3, bool), None), (n // 2, n // 2), o, o), mask)
 
+    def test_a_lonely_solid_cell_beside_a_mask_is_fog(self):
+        """However many pixels it covers; a slab of 12 cells beside it is not."""
+        n, solid = 320, self.region().solid.numpy().copy()
+        solid[:, abs(((np.arange(CELLS) + 0.5) * (2 / CELLS) - 1) * 1.6) > 0.2] = False
+        solid[CELLS // 2, CELLS // 2 + 9, CELLS // 2 + 15] = True
+        y, z = torch.meshgrid(torch.linspace(-0.35, 0.35, n // 2), torch.linspace(0.8, 0.3, n // 2), indexing="xy")
+        o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
+        region, d = Region(solid, None, None, solid), torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3)
+        assert 7 < region.cell_pixels((n // 2, n // 2), o, d) < 8
+        seen = region.blocks(o, d).view(n // 2, n // 2)
+        found = with_mirrors(torch.zeros(n, n), region, (n // 2, n // 2), o, d)
+        assert seen[:, 140:].any() and found[:, 90:230].min() == 1 and not found[:, 260:].any()
+
     def test_cells_that_several_photos_show_are_solid(self):
         random = np.random.default_rng(0)
         wall = np.column_stack([random.normal(size=400) * 0.002, random.uniform(-0.3, 0.3, (400, 2))])

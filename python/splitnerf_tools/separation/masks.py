@@ -150,7 +150,8 @@ def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
 
 
 def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> Tensor:
-    """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague.
+    """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague, a cell at
+    least: one cell beside the object is fog.
 
     Args:
         mask: The coverage of a view.
@@ -158,14 +159,17 @@ def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Te
         half: The height and width of an image of every other pixel.
         rays_o, rays_d: [half, 3] the view's rays through that image.
     """
+    if not region.solid.any():
+        return mask
     outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
     blocked = torch.zeros(half[0] * half[1])
     for chosen in outside.split(CHUNK):
         blocked[chosen] = region.blocks(rays_o[chosen], rays_d[chosen]).float()
     planes = blocked.view(1, 1, *half)
-    edge = 2 * RIM + 1
-    core = -max_pool2d(-planes, edge, 1, RIM)  # opened: thin rims go
-    opened = max_pool2d(core, edge, 1, RIM)
+    rim = max(RIM, math.ceil(region.cell_pixels(half, rays_o, rays_d)))
+    edge = 2 * rim + 1
+    core = -max_pool2d(-planes, edge, 1, rim)  # opened: thin rims go
+    opened = max_pool2d(core, edge, 1, rim)
     return torch.maximum(mask, interpolate(opened, mask.shape, mode="nearest")[0, 0])
 
 

@@ -68,6 +68,13 @@ class Region:
             solid &= self.table.heights(points) > LOW
         return solid.any(1)
 
+    def cell_pixels(self, size: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> float:
+        """The edge of a cell in the middle of the object, in pixels of an image [h, w] with rays [h w, 3]."""
+        row = slice((size[0] // 2) * size[1], (size[0] // 2 + 1) * size[1])
+        o, d = rays_o[row], rays_d[row]
+        across = o + ((self.middle() - o) * d).sum(1, keepdim=True) * d
+        return 2 * HALF / CELLS / max(float(across.diff(dim=0).norm(dim=1).median()), 1e-9) if size[1] > 1 else 0.0
+
     def above_table(self, rays_o: Tensor, rays_d: Tensor, distances: Tensor) -> Tensor:
         """Distances [n, k] along rays [n, 3], at most those of the table: what seems to lie below it is on it, vague or mirrored."""
         if self.table is None:
