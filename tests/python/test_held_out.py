@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from painted_ball import photos, sky, with_textures
+from painted_ball import heights, photos, sky, with_textures
 from splitnerf.refinement.fit import FitSettings, Refinement
+from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
 from splitnerf.refinement.stage import PATIENCE, Candidate, Stage
+from splitnerf.refinement.texels import AssetTexels
 
 SETTINGS = FitSettings(sweeps=3, pixels=128, directions=4, outline=False)
 
@@ -159,3 +161,34 @@ def test_a_stage_goes_on_with_its_best(painted):
     broken["best"][2] = broken["best"][2][:5]
     with pytest.raises(ValueError, match="unknowns"):
         Stage(data, asset, sky(), SETTINGS, broken)
+
+
+# Albedo, roughness and metallic of the upper and the lower half of a ball, and the light's brightness: what it is, and how training
+# may explain it.
+DIELECTRICS = (
+    (((0.3, 0.2, 0.0), (0.15, 0.6, 0.0)), 2.0),
+    (((0.6 / 0.9335, 0.2, 0.0665), (0.3 / 0.869, 0.6, 0.131)), 1.0),
+)
+FAINT_METAL = (((0.25, 0.2, 0.5), (0.03, 0.6, 0.0)), 1.0)
+
+
+@pytest.mark.parametrize("truth, trained, level", [(*DIELECTRICS, 2.0), (FAINT_METAL, FAINT_METAL, 1.0)])
+def test_photos_judge_whether_the_light_is_too_dark(ball, truth, trained, level):
+    """Black clay beside a glossy metal with the F0 of a dielectric under too dark a light: its own F0 says that the light is right."""
+
+    def made(halves):
+        texels = AssetTexels(ball)
+        values = texels.start.clone()
+        upper, lower = (torch.tensor([half[0]] * 3 + list(half[1:])) for half in halves)
+        values[:, :5] = torch.where(heights(texels) > 0, upper, lower)
+        return texels.asset_with(texels.maps(values))
+
+    data = photos(made(truth[0]), truth[1] * sky())
+    fit = Refinement(data, made(trained[0]), trained[1] * sky(), SETTINGS)
+    start, found = fit.unknowns, level_of_light(fit.texels.start)
+    held = fit.find_level(fit.held_errors())
+    assert found > 1.9 and fit.level == pytest.approx(level, rel=0.05)
+    np.testing.assert_array_equal(held, fit.held_errors())
+    assert torch.equal(fit.unknowns, start) == (level == 1)
+    light = fit.light.radiance().mean() / torch.from_numpy(trained[1] * sky()).mean()
+    assert float(light) == pytest.approx(fit.level, rel=1e-3)

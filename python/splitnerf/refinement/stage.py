@@ -15,7 +15,7 @@ import torch
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
-from splitnerf.refinement.fit import FitSettings, Refinement
+from splitnerf.refinement.fit import FitSettings, Refinement, is_worse
 from splitnerf.refinement.lamps import CompactLamp
 from splitnerf.refinement.light import radiance_of
 from splitnerf.refinement.outline import ROUNDS, fit_outline
@@ -23,7 +23,6 @@ from splitnerf.refinement.texels import check_form
 from splitnerf.refinement.unknowns import to_values
 
 BIASED = 1.05  # factor on the error of held-out pixels at the start, which training has fitted, as the trained asset has them
-SIGMAS = 2.0  # by which the best sweep must be better than the last one to be delivered in its place
 PATIENCE = 6  # sweeps after the best one, after which the fit ends
 LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
 OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
@@ -39,11 +38,11 @@ class Refined:
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
         sweeps: The report of each sweep.
-        held: The error of held-out pixels before the lamp and the first sweep, and with what is delivered.
+        held: The error of held-out pixels before the level, the lamp and the first sweep, and with what is delivered.
         delivered: The number of the sweep that is delivered; 0 for the start.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
-        level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`.
+        level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`; 1: it was not.
     """
 
     asset: Asset
@@ -86,9 +85,8 @@ class Candidate(NamedTuple):
     light: list[torch.Tensor]
 
     def is_worse(self, other: Candidate) -> bool:
-        """Whether the errors are larger than another's by SIGMAS standard errors of their difference."""
-        more = np.array(self.held) - other.held
-        return bool(more.mean() > SIGMAS * more.std(ddof=1) / math.sqrt(len(more)))
+        """Whether the errors are clearly larger than another's."""
+        return is_worse(self.held, other.held)
 
 
 def decibels(error: float) -> float:
@@ -152,6 +150,7 @@ class Stage:
             return
         start = self.fit.held_errors()
         self.held_start = float(start.mean())
+        start = self.fit.find_level(start)
         if settings.light_step > 0 and self.seconds < OUTLINE_SHARE * self.limit:
             show(self.progress, "refinement, looking for a lamp")
             self.lamp = self.fit.make_lamp_compact()
