@@ -5,15 +5,17 @@ import threading
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.images import read_image
 from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight
 from splitnerf.pipeline import check_repeatable, load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
-from splitnerf.training import loop, meshes
+from splitnerf.training import loop, meshes, metrics
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged
 from splitnerf.training.gpu_step import GpuStep
@@ -136,6 +138,21 @@ def test_a_line_of_the_log_holds_the_weighted_terms(data, tmp_path):
         assert line["psnr"] == pytest.approx(mean, abs=1e-3)
     assert max(psnr) - min(psnr) > 0.1
     assert "loss_light" not in lines[0]  # texels are filtered exactly; an MLP is asked to be consistent
+
+
+def test_previews_of_large_photos_are_smaller_pictures_of_the_view(data, tmp_path, monkeypatch):
+    dataset = load_dataset(data)
+    training = loop.Training(dataset, tiny(steps=1), tmp_path, torch.device("cpu"))
+    pictures = []
+    for step, edge in enumerate((dataset.width, dataset.width - 1)):
+        monkeypatch.setattr(metrics, "PREVIEW_EDGE", edge)
+        path = metrics.write_preview(tmp_path, training.model, training.grid, dataset, step)
+        pictures.append(read_image(path)[..., :3])
+    height, width = dataset.height // 2, dataset.width // 2
+    large, small = pictures[0].reshape(height, 2, 4 * width, 2, 3).mean(axis=(1, 3)), pictures[1]
+    assert small.shape == (height, 4 * width, 3)
+    np.testing.assert_allclose(small[:, :width], large[:, :width], atol=0.01)  # the photo
+    assert np.abs(small - large).mean() < 0.03
 
 
 def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from torch import Tensor
 DIELECTRIC = 0.04  # F0, reflectance at normal incidence
 DARKEST_METAL = 0.2  # F0 below which a texel is a dielectric, whatever its metallic says
 GLOSSY = 0.4  # roughness below which F0 is told from what is scattered
-LEAST_SHARE = 0.05  # of the texels that must be glossy dielectrics
+LEAST_SHARE = 0.1  # of the texels that must be glossy dielectrics
 LEAST_FACTOR = 1.05  # below which the level stays
 
 

@@ -370,9 +370,12 @@ def render_view(
     }
 
 
-def render_maps(model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int) -> dict[str, np.ndarray]:
-    """All maps of one view as float32 arrays, see :func:`render_view`."""
+def render_maps(
+    model: SceneModel, grid: OccupancyGrid, dataset: Dataset, index: int, factor: int = 1
+) -> dict[str, np.ndarray]:
+    """All maps of one view as float32 arrays, see :func:`render_view`; smaller than its photo by a whole factor."""
     pose, intrinsics = (torch.from_numpy(x[index]).to(model.device) for x in (dataset.poses, dataset.intrinsics))
     turn = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns[index]).to(model.device)
-    maps = render_view(model, grid.cells, pose, intrinsics, dataset.height, dataset.width, turn=turn)
+    height, width = dataset.height // factor, dataset.width // factor
+    maps = render_view(model, grid.cells, pose, intrinsics / factor, height, width, turn=turn)
     return {name: value.cpu().numpy() for name, value in maps.items()}

@@ -17,6 +17,7 @@ from splitnerf.render.renderer import render_maps
 from splitnerf.training.step import StepNumbers
 
 METRICS = "metrics.jsonl"
+PREVIEW_EDGE = 256  # pixels, at most
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
 
 
@@ -86,10 +87,14 @@ def keep_metrics(path: Path, step: int) -> None:
 
 
 def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Dataset, step: int) -> Path:
-    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side; returns its path."""
-    maps = render_maps(model, grid, dataset, 0)
+    """``previews/step_NNNNNN.png``: the first view's photo, render, albedo and normals side by side; returns its path. A whole
+    photo of a megapixel would take as long as a thousand steps."""
+    factor = math.ceil(max(dataset.height, dataset.width) / PREVIEW_EDGE)
+    maps = render_maps(model, grid, dataset, 0, factor)
     photo = over_background(dataset.images[0, ..., :3], dataset.images[0, ..., 3])
-    panels = [photo] + [
+    height, width = maps["alpha"].shape
+    blocks = photo[: height * factor, : width * factor].reshape(height, factor, width, factor, 3)
+    panels = [blocks.mean(axis=(1, 3))] + [
         over_background(rgb, maps["alpha"])
         for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
     ]
