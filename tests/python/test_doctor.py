@@ -68,7 +68,8 @@ def test_the_answers_are_those_of_this_version(tmp_path):
     for name, known in self_test.answers().items():
         assert now[name].keys() == known.keys()
         for result, pair in known.items() if name not in self_test.CPU_ALONE else ():
-            assert now[name][result] == pytest.approx(pair, rel=1e-7, abs=1e-7 * pair[1]), (name, result)
+            # Processors round differently: with AVX2 alone a roughness's gradient is 4e-7 of its size off.
+            assert now[name][result] == pytest.approx(pair, rel=1e-6, abs=1e-6 * pair[1]), (name, result)
 
 
 def test_what_is_traced_stays_on_the_cpu():

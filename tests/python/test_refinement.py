@@ -18,6 +18,7 @@ from splitnerf.export.scene import write_environment
 from splitnerf.export.writers import write_glb
 from splitnerf.refinement import fit as fit_module
 from splitnerf.refinement.fit import FitSettings, Refinement, srgb_slope
+from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.refine import fitting_height
@@ -160,6 +161,7 @@ def test_the_level_of_the_light_is_set_before_the_fit(painted):
     fit = Refinement(
         data, with_textures(asset, albedo_texture=dark_metal, roughness_metallic_texture=gloss), sky(), FitSettings()
     )
+    fit.begin_at(level_of_light(fit.texels.start))
     assert fit.level == pytest.approx(1.9, rel=1e-4)
     torch.testing.assert_close(fit.light.radiance(), 1.9 * torch.from_numpy(sky()), rtol=1e-3, atol=1e-4)
     assert (to_values(fit.unknowns)[:, 4] == 0).all()

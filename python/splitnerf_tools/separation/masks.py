@@ -22,7 +22,7 @@ SAMPLES = 64, 32  # of a ray, of the first search and of the second
 CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
-RIM = 3  # every other pixel beside a mask in which solid cells say nothing
+RIM, WIDEST_RIM = 3, 32  # every other pixel beside a mask in which solid cells say nothing, at least and at most
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
 HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
 # Size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts.
@@ -166,7 +166,7 @@ def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Te
     for chosen in outside.split(CHUNK):
         blocked[chosen] = region.blocks(rays_o[chosen], rays_d[chosen]).float()
     planes = blocked.view(1, 1, *half)
-    rim = max(RIM, math.ceil(region.cell_pixels(half, rays_o, rays_d)))
+    rim = math.ceil(min(max(RIM, region.cell_pixels(half, rays_o, rays_d)), WIDEST_RIM))
     edge = 2 * rim + 1
     core = -max_pool2d(-planes, edge, 1, rim)  # opened: thin rims go
     opened = max_pool2d(core, edge, 1, rim)
