@@ -15,7 +15,7 @@ from splitnerf.cli.common import BAD_INPUT
 from splitnerf.config import Config
 from splitnerf.data import pixels
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
-from splitnerf.data.images import area_average, linear_to_srgb, read_image, srgb_to_linear
+from splitnerf.data.images import area_average, linear_to_srgb, read_image, srgb_to_linear, write_image
 from splitnerf.data.pixels import Photos, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -309,6 +309,28 @@ def test_edges_of_averages_are_compared_whole(tmp_path):
     assert cut.sum() > 40 and whole[cut].all() and whole.sum() > 3 * cut.sum()
     torch.testing.assert_close(pixels[..., :3], torch.from_numpy(expected), rtol=0, atol=1e-4)
     torch.testing.assert_close(behind[whole], torch.full((int(whole.sum()), 3), 51 / 255))
+
+
+def test_what_the_data_tell_of_the_background_is_compared(tmp_path):
+    """A file of half the photo's size, which knows the left half; of another shape it is refused."""
+    photo, told = wall(0.2), np.zeros((60, 90, 4), np.float32)
+    told[:, :45], told[:, 45:, :3] = np.float32([0, 200, 100, 255]) / 255, 0.3
+    write_image(tmp_path / "told.png", told)
+    dataset = far(scene(tmp_path, np.stack([photo, photo])))
+    dataset = replace(dataset, behind_paths=[tmp_path / "told.png", None])
+    assert (dataset.select([1, 0]).behind(1)[..., 3] == 1).sum() == 120 * 89  # the pixel between both is half known
+    source = source_of(dataset, averaging(dataset, 3))
+    everywhere = torch.arange(2 * 40 * 60)
+    view = everywhere // (40 * 60)
+    _, _, behind, whole = source.pixels.read(everywhere, view, torch.ones(2, 3), torch.rand(4800, 3), source.edges)
+    behind, whole = behind.unflatten(0, (2, 40, 60)), whole.unflatten(0, (2, 40, 60))
+    assert whole[0].equal(whole[1]) and whole[0, :, :29].sum() > 50 and whole[0, :, 30:].sum() > 50
+    green, grey = torch.tensor([0, 200, 100]) / 255, torch.full((3,), 51 / 255)
+    for part, colour in ((np.s_[0, :, :29], green), (np.s_[0, :, 31:], grey), (np.s_[1], grey)):
+        torch.testing.assert_close(behind[part][whole[part]], colour.expand(int(whole[part].sum()), 3))
+    write_image(tmp_path / "told.png", told[:, :70])
+    with pytest.raises(InputError, match="told.png: must be RGBA and of its photo's shape, 180x120"):
+        dataset.behind(0)
 
 
 @pytest.mark.parametrize("brightness, edge_pixels", [(1.0, 2), (0.2, 0)])

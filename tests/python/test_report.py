@@ -15,8 +15,10 @@ import pytest
 import splitnerf_tools.report
 from painted_ball import with_textures
 from PIL import Image
+from splitnerf.cli.common import print_scores
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
+from splitnerf.evaluate.grades import graded
 from splitnerf.export.writers import write_glb
 from splitnerf.relight.cameras import MARGIN
 from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light
@@ -24,7 +26,6 @@ from splitnerf_tools.report import run as report_run
 from splitnerf_tools.report import write_report
 from splitnerf_tools.report.drawings import curve_data, line_chart
 from splitnerf_tools.report.embedding import data_uri, script_json
-from splitnerf_tools.report.grades import graded
 from splitnerf_tools.report.run import RELIT_GREY, relit_pictures
 from splitnerf_tools.report.sections import fitted
 
@@ -326,6 +327,15 @@ def test_scores_are_said_in_words():
 def test_the_scale_of_scores_keeps_the_digits_that_count():
     scales = [row["scale"] for row in graded({"roughness_mae": 0.0, "novel_view": {"psnr": 31.0}})]
     assert scales == ["good from 30 dB, poor below 25 dB", "good up to 0.08 off, poor above 0.16 off"]
+
+
+def test_the_terminal_says_what_scores_mean(capsys):
+    print_scores({"novel_view": {"psnr": 31.0, "ssim": 0.9, "lpips": None}, "normal_mae_deg": 7.06, "chamfer": 0.01})
+    assert capsys.readouterr().out.splitlines() == [
+        "novel views            PSNR 31.00 dB, SSIM 0.9000 (good)",
+        "normals, mean angle    7.06 degrees (fair)",
+        "mesh chamfer           0.01",
+    ]
 
 
 def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):

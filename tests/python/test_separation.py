@@ -22,7 +22,7 @@ from splitnerf_tools.separation import training
 from splitnerf_tools.separation.field import RadianceField, Rendered
 from splitnerf_tools.separation.foot import find_foot
 from splitnerf_tools.separation.ground import Table, find_table
-from splitnerf_tools.separation.masks import _points, at_edges, find_mask, with_mirrors, without_specks
+from splitnerf_tools.separation.masks import _points, at_edges, behind, find_mask, view_rays, with_mirrors, without_specks
 from splitnerf_tools.separation.region import CELLS, Region, find_region
 from tiny_runs import train
 
@@ -131,7 +131,8 @@ class TrueField:
     def render(self, rays_o, rays_d, n_first, n, jitter=False, hidden=None):
         origins, rays = rays_o.double().numpy() * self.scale + self.shift, rays_d.double().numpy()
         if hidden is not None:
-            assert hidden(rays_o).all()  # it asks from the ball's middle
+            middle = (CENTRE - self.shift) / self.scale
+            assert hidden(torch.from_numpy(middle).float())
         colour, t, _ = ball_on_floor(origins, rays, RADIUS if hidden is None else 0.0)
         weights = torch.zeros(len(rays), n)
         weights[:, 0] = 1
@@ -208,9 +209,30 @@ def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(
     """Or for a wall: before what all points lie on, the object is cut from it."""
     masks = write_ball_on_floor(tmp_path)
     monkeypatch.setattr(capture_masks, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
-    found = capture_masks.find_masks(tmp_path, SimpleNamespace(table=False), 0, lambda share: None)
-    shares = [((a > 0.5) & b).sum() / ((a > 0.5) | b).sum() for a, b in zip(found, masks)]
+    found = list(capture_masks.find_masks(tmp_path, SimpleNamespace(table=False), 0, False, lambda share: None))
+    shares = [((a > 0.5) & b).sum() / ((a > 0.5) | b).sum() for (a, _), b in zip(found, masks)]
     assert np.mean(shares) > 0.9
+    told = [picture[..., 3] > 0 for _, picture in found]
+    assert all((part & b).sum() > 20 and (part & ~b).sum() > 50 for part, b in zip(told, masks))
+    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    for i, (_, picture) in enumerate(found):
+        rays_o, rays_d = (x.numpy() for x in view_rays(photos, i, (SIZE, SIZE)))
+        world = rays_o * photos.world_from_box[0, 0] + photos.world_from_box[:3, 3]
+        floor = ball_on_floor(world, rays_d, 0.0)[0].reshape(SIZE, SIZE, 3)
+        assert np.abs(picture[..., :3] - floor)[told[i]].max() < 0.01
+
+
+def test_what_is_behind_is_not_told_where_the_field_shows_something_else(tmp_path):
+    """Somebody walks through the left half of a photo; a turntable's surroundings move in all of them."""
+    masks = write_ball_on_floor(tmp_path, 8)
+    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
+    alone = behind(field, region, photos, 0, masks[0].astype(np.float32))
+    images = np.array(photos.images)
+    images[0, :, : SIZE // 2, :3] = 1 - images[0, :, : SIZE // 2, :3]
+    crossed = behind(field, region, replace(photos, images=images), 0, masks[0].astype(np.float32))
+    assert (alone[:, : SIZE // 2, 3] > 0).sum() > 50 and not crossed[:, : SIZE // 2 - 4].any()
+    np.testing.assert_array_equal(crossed[:, SIZE // 2 + 12 :], alone[:, SIZE // 2 + 12 :])
 
 
 def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):

@@ -187,19 +187,22 @@ def print_refinement(summary: dict | None) -> None:
 
 
 def print_scores(evaluation: dict) -> None:
-    """A line for each score, after its free scale if it has one."""
+    """A line for each score, after its free scale if it has one, with what it means in a word."""
+    from splitnerf.evaluate.grades import graded
+
+    words = {row["place"][0]: f" ({row['word']})" for row in graded(evaluation)}
     for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):
         scores = evaluation.get(key)
         if scores:
             lpips = "" if scores["lpips"] is None else f", LPIPS {scores['lpips']:.4f}"
-            print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}")
+            print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}{words[key]}")
     for name, key, unit in (
-        ("normals, mean angle", "normal_mae_deg", "degrees"),
+        ("normals, mean angle", "normal_mae_deg", " degrees"),
         ("roughness, mean error", "roughness_mae", ""),
         ("metallic, bal. accuracy", "metallic_balanced_accuracy", ""),
-        ("light PSNR", "light_psnr", "dB"),
+        ("light PSNR", "light_psnr", " dB"),
         ("mesh chamfer", "chamfer", ""),
         ("mesh F-score", "f_score", ""),
     ):
         if evaluation.get(key) is not None:
-            print(f"{name:22s} {evaluation[key]:.4g} {unit}".rstrip())
+            print(f"{name:22s} {evaluation[key]:.4g}{unit}{words.get(key, '')}")

@@ -10,21 +10,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import torch
+from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import read_surroundings
 from splitnerf.data.frames import read_frames
-from splitnerf.data.images import area_average
+from splitnerf.data.images import area_average, read_image
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
-from splitnerf.data.photos import CERTAIN, Loader, Photo, silhouette_factor
+from splitnerf.data.photos import CERTAIN, Loader, Photo, separated_mask, silhouette_factor
 from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, memory_for_photos, new_array
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, note_once
 from splitnerf.progress import tracked
 
 SURROUNDINGS = "surroundings.exr"
+BEHIND = "behind"  # the folder of what is behind the object, in that of separated data
 EXPOSURES = "exposures.json"  # in a run: the exposures of photos that it learned
 JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
@@ -63,6 +66,7 @@ class Dataset:
             well it was seen, in [0, 1]; None where the data have no such map.
         light_turns: [n, 3, 3] float32, the rotations that carry directions of the internal frame to those in which the light
             stands still; None where it stands still in the internal frame. On a turntable each photo has its own.
+        behind_paths: The files of :meth:`behind`, or None for photos without.
         masked: Whether alpha says where the object is; otherwise it is 1.
         whole: Whether the colours are those of the whole photos, also where alpha is less than 1.
     """
@@ -84,6 +88,7 @@ class Dataset:
     stated: np.ndarray | None = None
     surroundings: np.ndarray | None = None
     light_turns: np.ndarray | None = None
+    behind_paths: list[Path | None] | None = None
     masked: bool = True
     whole: bool = False
 
@@ -92,6 +97,7 @@ class Dataset:
         n, size = len(self.images), self.images.shape[1:3]
         self.sizes = np.tile(size, (n, 1)) if self.sizes is None else self.sizes
         self.exposures, self.stated = (np.ones(n) if x is None else x for x in (self.exposures, self.stated))
+        self.behind_paths = [None] * n if self.behind_paths is None else self.behind_paths
 
     def __len__(self) -> int:
         return len(self.images)
@@ -115,6 +121,26 @@ class Dataset:
         """A picture [h, w, ...] of a photo's size as [H, W, ...], 0 beside it."""
         beside = [(0, self.height - picture.shape[0]), (0, self.width - picture.shape[1])]
         return np.pad(picture, beside + [(0, 0)] * (picture.ndim - 2)) if np.any(beside) else picture
+
+    def behind(self, view: int) -> np.ndarray | None:
+        """[H, W, 4] float32, what a photo would show without the object: sRGB at the photo's own exposure, and 1 where that is
+        known, along the mask's edges, else 0; None where the data do not say.
+
+        Raises:
+            InputError: The file cannot be read, or has another shape than the photo.
+        """
+        path, (height, width) = self.behind_paths[view], self.sizes[view].tolist()
+        if path is None:
+            return None
+        image = read_image(path)
+        if image.shape[2] != 4 or abs(image.shape[0] * width - image.shape[1] * height) > 2 * max(width, height):
+            raise InputError(f"{path}: must be RGBA and of its photo's shape, {width}x{height}; make it again, or leave it out")
+        image[..., :3] *= image[..., 3:]
+        planes = torch.from_numpy(image).permute(2, 0, 1)[None]
+        planes = interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)[0]
+        image = planes.permute(1, 2, 0).numpy()
+        known = image[..., 3:] > CERTAIN
+        return self.padded(np.where(known, np.concatenate([image[..., :3], known], axis=-1), np.float32(0)))
 
     @property
     def world_from_box(self) -> np.ndarray:
@@ -195,6 +221,7 @@ class Dataset:
             stated=self.stated[views],
             frame_names=[self.frame_names[i] for i in views],
             image_paths=[self.image_paths[i] for i in views],
+            behind_paths=[self.behind_paths[i] for i in views],
         )
 
 
@@ -266,6 +293,7 @@ def load_dataset(
         stated=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
         light_turns=_light_turns(frames),
+        behind_paths=[_behind_path(frame, root, reading) for frame in frames],
         masked=_has_masks(photos),
         whole=all(photo.whole for photo in photos),
     )
@@ -276,6 +304,14 @@ def _surroundings(root: Path, reading: Reading) -> np.ndarray | None:
     folders = [root] if reading.separated is None else [root, reading.separated]
     path = next((folder / SURROUNDINGS for folder in folders if (folder / SURROUNDINGS).is_file()), None)
     return None if path is None else read_surroundings(path)
+
+
+def _behind_path(frame: Frame, root: Path, reading: Reading) -> Path | None:
+    """The file with what is behind the object: the data's own, else what training separated."""
+    if frame.behind_path is not None or reading.separated is None:
+        return frame.behind_path
+    path = reading.separated / BEHIND / separated_mask(frame.image_path, root)
+    return path if path.is_file() else None
 
 
 def _light_turns(frames: list[Frame]) -> np.ndarray | None:

@@ -80,7 +80,7 @@ def edge_runs(
     """The pixels within a band along the edges of the masks, of the results of :func:`edge_of` for photos with as many pixels.
 
     There a mask is not trusted to a pixel: a colour is compared including the background, the object over the colour behind
-    it, which is filled in from outside the band. 24 bytes a run of neighbours and 3 a pixel.
+    it. 24 bytes a run of neighbours and 3 a pixel.
     """
     if not photos:
         return EdgeRuns.none(device)
@@ -91,12 +91,21 @@ def edge_runs(
 
 
 def edge_of(
-    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int
+    colours: np.ndarray,
+    alpha: np.ndarray,
+    known: np.ndarray | None,
+    width: int,
+    told: np.ndarray | None = None,
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """The pixels of a photo within `width` pixels of its mask's edges as runs (see :func:`runs_of`), and the sRGB
-    colours [k, 3] uint8 behind the object there. Pixels before a clipped background are left out. `colours` [H, W, 3]
-    are whole numbers or floats in [0, 1], `alpha` [H, W] is the mask, `known` [H, W] the valid pixels (None: all)."""
+    colours [k, 3] uint8 behind the object there: those of `told` (see :meth:`splitnerf.data.dataset.Dataset.behind`), elsewhere
+    filled in from outside the band. Pixels before a clipped background are left out. `colours` [H, W, 3] are whole numbers or floats
+    in [0, 1], `alpha` [H, W] is the mask, `known` [H, W] the valid pixels (None: all)."""
     near, behind = edge_mask(colours, alpha, known, width)
+    if told is not None:
+        codes = (255 * told[near] + 0.5).astype(np.uint8)
+        sure = (codes[:, 3] > 0) & (codes[:, :3].max(axis=1) < BRIGHTEST)
+        behind = np.where(sure[:, None], codes[:, :3], behind)
     return runs_of(torch.from_numpy(near)), behind
 
 
@@ -252,7 +261,7 @@ class PixelSource:
                 known.append(runs_of(known_here))
             if edge_pixels and dataset.whole:
                 known_here = None if known_here is None else known_here.numpy()
-                edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels))
+                edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels, dataset.behind(i)))
             near.append(runs_of(wide))
             possible.append(reduced(seen, self._factor))
             del alpha, mask, wide, seen, known_here

@@ -6,7 +6,7 @@ they fill the gap below a handle, lose dark undersides and thin rods.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,20 +23,24 @@ from splitnerf_tools.capture.photographs import Photograph
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
 from splitnerf_tools.separation.ground import Table
-from splitnerf_tools.separation.masks import find_mask, surface_points
+from splitnerf_tools.separation.masks import behind, find_mask, surface_points
 from splitnerf_tools.separation.separate import find_object, table_under
 from splitnerf_tools.separation.training import train_field
 
 STEPS = 5500  # of the field
 
 
-def find_masks(out: Path, world: World, seed: int, report: Callable[[float], None]) -> list[np.ndarray]:
-    """[h, w] masks in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own.
+def find_masks(
+    out: Path, world: World, seed: int, turntable: bool, report: Callable[[float], None]
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """The masks [h, w] in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own, and what is behind
+    the object, see :func:`splitnerf_tools.separation.masks.behind`; None on a turntable, where it moves.
 
     Args:
         out: The folder of the undistorted photos.
         world: The cameras' world.
         seed: The seed of the field.
+        turntable: Whether the object turned.
         report: Called with the share done.
 
     Raises:
@@ -48,11 +52,10 @@ def find_masks(out: Path, world: World, seed: int, report: Callable[[float], Non
     points = surface_points(field, photos)
     table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else table_under(points, photos, seed)
     region = find_object(field, photos, table, points)
-    masks = []
     for i in range(len(photos)):
-        masks.append(find_mask(field, region, photos, i))
+        mask = find_mask(field, region, photos, i)
+        yield mask, None if turntable else behind(field, region, photos, i, mask)
         report(0.8 + 0.2 * (i + 1) / len(photos))
-    return masks
 
 
 def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:

@@ -221,30 +221,37 @@ def write_data(
     settings: PrepareSettings,
     report: Callable[[str, float], None],
 ) -> np.ndarray:
-    """Writes `images/`, `masks/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
+    """Writes `images/`, `masks/`, `behind/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
-    for folder in ("images", "masks"):
+    for folder in ("images", "masks", "behind"):
         (out / folder).mkdir(exist_ok=True)
     for i, (name, pinhole) in enumerate(zip(scene.names, pinholes)):
         photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
         write_png(out / "images" / f"{name}.png", undistort(photo, scene.lenses[i], pinhole))
         report("images", (i + 1) / len(scene.names))
     if mask_of is None:
-        _write_transforms(world, exposures, pinholes, out, masked=False, turntable=settings.turntable)
-        try:
-            masks = find_masks(out, world, settings.seed, lambda share: report("masks", share))
-        except BaseException:
-            (out / TRANSFORMS).unlink()  # data without their masks are half of the data
-            raise
-    else:
-        masks = given_masks(world, mask_of, settings.masks, settings.max_size)
-    for name, pinhole, mask in zip(scene.names, pinholes, masks):
-        small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
-        write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))
-    _write_transforms(world, exposures, pinholes, out, masked=True, turntable=settings.turntable)
+        _write_transforms(world, exposures, pinholes, out, [{}] * len(pinholes), turntable=settings.turntable)
+    shares, files = [], []
+    try:
+        if mask_of is None:
+            found = find_masks(out, world, settings.seed, settings.turntable, lambda share: report("masks", share))
+        else:
+            found = ((mask, None) for mask in given_masks(world, mask_of, settings.masks, settings.max_size))
+        for name, pinhole, (mask, behind) in zip(scene.names, pinholes, found):
+            small, size = Image.fromarray((255 * mask + 0.5).astype(np.uint8)), (pinhole.width, pinhole.height)
+            write_png(out / "masks" / f"{name}.png", np.asarray(small.resize(size, Image.Resampling.BILINEAR)))
+            files.append({"mask_path": f"masks/{name}.png"})
+            if behind is not None:
+                files[-1]["behind_path"] = f"behind/{name}.png"
+                write_image(out / files[-1]["behind_path"], behind)
+            shares.append(mask.mean())
+    except BaseException:
+        (out / TRANSFORMS).unlink(missing_ok=True)  # data without their masks are half of the data
+        raise
+    _write_transforms(world, exposures, pinholes, out, files, turntable=settings.turntable)
     if not settings.turntable:  # what is around the object stands elsewhere in each photo
         write_image(out / SURROUNDINGS, surroundings_of(world, exposures, out, settings))
-    return np.array([mask.mean() for mask in masks])
+    return np.array(shares)
 
 
 def surroundings_of(world: World, exposures: Exposures, out: Path, settings: PrepareSettings) -> np.ndarray:
@@ -264,16 +271,15 @@ def surroundings_of(world: World, exposures: Exposures, out: Path, settings: Pre
 
 
 def _write_transforms(
-    world: World, exposures: Exposures, pinholes: list[Lens], out: Path, *, masked: bool, turntable: bool
+    world: World, exposures: Exposures, pinholes: list[Lens], out: Path, files: list[dict], *, turntable: bool
 ) -> None:
-    """`transforms.json`, with the masks that stand beside it or without, and the light's rotations on a turntable."""
+    """`transforms.json`, with the files that each frame has beside its image, and the light's rotations on a turntable."""
     frames, turns = [], light_turns(world.scene.poses)
     for i, (name, pinhole) in enumerate(zip(world.scene.names, pinholes)):
-        mask = {"mask_path": f"masks/{name}.png"} if masked else {}
         frames.append(
             {
                 "file_path": f"images/{name}.png",
-                **mask,
+                **files[i],
                 "w": pinhole.width,
                 "h": pinhole.height,
                 "fl_x": pinhole.fx,

@@ -27,7 +27,7 @@ from splitnerf.render.path_traced import AssetRenderer
 from splitnerf.run_folder import ASSET_FILES, is_refined
 from splitnerf.training.metrics import METRICS, read_metrics
 
-from splitnerf_tools.report.grades import graded
+from splitnerf.evaluate.grades import graded
 from splitnerf_tools.report.html import write_report
 
 RELIT = ("studio", "sunny", "sunset")

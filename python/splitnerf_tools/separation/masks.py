@@ -9,7 +9,7 @@ import torch
 from scipy import ndimage
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import directions_of_texels, texels_of_directions
-from splitnerf.data.images import srgb_to_linear
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.render.rays import image_rays
 from torch import Tensor
 from torch.nn.functional import interpolate, max_pool2d
@@ -23,6 +23,8 @@ CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 RIM, WIDEST_RIM = 3, 32  # every other pixel beside a mask in which solid cells say nothing, at least and at most
+BESIDE = 4  # pixels on both sides of a mask's edge, in which what is behind the object is told
+MISFIT = 0.1  # of the field from the photo there, root mean square in sRGB, up to which it is believed
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
 HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
 # Size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts.
@@ -126,8 +128,13 @@ def find_mask(field: RadianceField, region: Region, dataset: Dataset, index: int
     if len(chosen):
         mask[chosen] = coverage(field, region, rays_o[chosen], rays_d[chosen])
     mask = with_mirrors(mask.view(size).clamp(0, 1), region, half, *view_rays(dataset, index, half)).numpy()
+    return without_specks(at_edges(mask, _photo(dataset, index, size)))
+
+
+def _photo(dataset: Dataset, index: int, size: tuple[int, int]) -> np.ndarray:
+    """[h, w, 3] a photo in a smaller size, at one exposure."""
     photo = torch.from_numpy(dataset.cropped(index, dataset.images[index])[..., :3]).permute(2, 0, 1)
-    return without_specks(at_edges(mask, interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy()))
+    return interpolate(photo[None], size, mode="area")[0].permute(1, 2, 0).numpy()
 
 
 def without_specks(mask: np.ndarray) -> np.ndarray:
@@ -171,6 +178,31 @@ def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Te
     core = -max_pool2d(-planes, edge, 1, rim)  # opened: thin rims go
     opened = max_pool2d(core, edge, 1, rim)
     return torch.maximum(mask, interpolate(opened, mask.shape, mode="nearest")[0, 0])
+
+
+@torch.no_grad()
+def behind(field: RadianceField, region: Region, dataset: Dataset, index: int, mask: np.ndarray) -> np.ndarray:
+    """[h, w, 4] in [0, 1], what a view would show without the object along the edges of its mask [h, w]: sRGB at the view's
+    exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, and where the field shows
+    something else than the photo does beside the object."""
+    inside = mask > 0.5
+    near = ndimage.binary_dilation(inside, iterations=BESIDE) & ~ndimage.binary_erosion(
+        inside, iterations=BESIDE, border_value=1
+    )
+    chosen = torch.from_numpy(np.flatnonzero(near))
+    rays_o, rays_d = view_rays(dataset, index, mask.shape)
+    shown, known = np.zeros((mask.size, 3), np.float32), np.zeros(mask.size, bool)
+    for part in chosen.split(CHUNK):
+        o, d = rays_o[part], rays_d[part]
+        shown[part] = field.render(o, d, *SAMPLES, hidden=region.holds).colour.clamp(0, 1)
+        known[part] = ~region.stands_at(o, d)
+    shown, known = shown.reshape(*mask.shape, 3), known.reshape(mask.shape)
+    outside = near & ~ndimage.binary_dilation(inside, iterations=BESIDE // 2)
+    apart = np.square(shown - _photo(dataset, index, mask.shape).clip(0, 1)).mean(-1) * outside
+    misfit, share = (ndimage.gaussian_filter(x.astype(np.float32), BESIDE) for x in (apart, outside))
+    known &= misfit < MISFIT**2 * share
+    exposed = linear_to_srgb(srgb_to_linear(shown) * np.float32(dataset.exposures[index])).clip(0, 1)
+    return np.concatenate([exposed, np.ones_like(shown[..., :1])], axis=-1) * known[..., None]
 
 
 @torch.no_grad()

@@ -83,6 +83,14 @@ class Region:
         table = torch.where((fall > 0) & (height > 0), height / fall.clamp(min=1e-6), math.inf)
         return torch.minimum(distances, table[:, None])
 
+    def stands_at(self, rays_o: Tensor, rays_d: Tensor) -> Tensor:
+        """[n] bool, whether rays [n, 3] meet the table where the object stands on it."""
+        if self.table is None:
+            return torch.zeros(len(rays_o), dtype=torch.bool)
+        distance = self.above_table(rays_o, rays_d, torch.full((len(rays_o), 1), math.inf))
+        meets = distance.isfinite()[:, 0]
+        return meets & self.holds(rays_o + distance.nan_to_num(posinf=0.0) * rays_d)
+
     def with_foot(self, points: np.ndarray, colours: np.ndarray) -> Region:
         """The region, near its table by points [n, 3] that photos show there and their colours [n, 3]."""
         held = self.holds(torch.from_numpy(points)).numpy() & (self.table.heights(points) > LOW)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from splitnerf.data.dataset import SURROUNDINGS, Dataset, spread
+from splitnerf.data.dataset import BEHIND, SURROUNDINGS, Dataset, spread
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.photos import resized_mask, separated_mask
@@ -18,7 +18,7 @@ from splitnerf.progress import Progress, ended_by_signals, tracked
 
 from splitnerf_tools.separation.field import RadianceField
 from splitnerf_tools.separation.ground import Table, find_table
-from splitnerf_tools.separation.masks import find_mask, points_near, surface_points, surroundings
+from splitnerf_tools.separation.masks import behind, find_mask, points_near, surface_points, surroundings
 from splitnerf_tools.separation.region import Region, find_region
 from splitnerf_tools.separation.training import train_field
 
@@ -47,7 +47,7 @@ class Separated:
 
 
 def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> Separated:
-    """Writes a mask for each photo, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
+    """Writes a mask for each photo, what is behind the object there, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
     plane of a table if there is one, and hangs together in the middle, is the object.
@@ -128,13 +128,13 @@ def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None
 
 
 def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Path) -> np.ndarray:
-    """Writes the masks of a split; returns the share [n] that each covers."""
+    """Writes the masks of a split and what is behind the object; returns the share [n] that each covers."""
     shares = []
     for i in tracked(range(len(split)), "masks, photo"):
-        mask = find_mask(field, region, split, i)
-        path = folder / separated_mask(split.image_paths[i], split.root)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_image(path, mask)
+        mask, name = find_mask(field, region, split, i), separated_mask(split.image_paths[i], split.root)
+        for path, picture in ((folder / name, mask), (folder / BEHIND / name, behind(field, region, split, i, mask))):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_image(path, picture)
         shares.append(mask.mean())
     return np.array(shares)
 

@@ -9,6 +9,7 @@ Keys, those of a frame before those of the file:
     frames[].file_path          the image, with or without suffix, relative to the file
     frames[].transform_matrix   4 x 4 camera-to-world, OpenGL axes
     frames[].mask_path          null or a mask
+    frames[].behind_path        null or what the image would show without the object, with alpha where that is known
     mask_kind                   what the masks mean, "object" or "ignore"; without it :mod:`splitnerf.data.dataset` finds out
     frames[].light_rotation     3 x 3, from directions of the world to those in which the light stands still (a turntable)
     frames[].exposure           the factor of the image's linear values, 1 where it is missing
@@ -50,6 +51,7 @@ OF_FRAME = OF_BOTH | {
     "transform_matrix",
     "light_rotation",
     "mask_path",
+    "behind_path",
     "exposure",
     "rotation",
     "sharpness",
@@ -162,8 +164,10 @@ def read_entries(path: Path) -> tuple[dict, list[dict]]:
 def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | None = None) -> Frame:
     """Frame `index` of a transforms file; its image is relative to `folder`, by default to the file's."""
     image_path = listed_image(folder or path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
-    mask = entry.get("mask_path")
-    mask_path = None if mask is None else listed_file(path.parent, str(mask), path)
+    mask_path, behind_path = (
+        None if entry.get(key) is None else listed_file(path.parent, str(entry[key]), path)
+        for key in ("mask_path", "behind_path")
+    )
     dynamic = image_path.with_name(f"dynamic_mask_{image_path.stem}.png")
     pose, lens, distortion = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
     mask_kind = entry.get("mask_kind", meta.get("mask_kind", "auto"))
@@ -180,6 +184,7 @@ def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | N
         mask_path,
         mask_kind,
         dynamic_mask_path=dynamic if is_file(dynamic) else None,
+        behind_path=behind_path,
         exposure=_read_exposure(entry, index, path),
         gamma=_read_gamma(entry.get("gamma", meta.get("gamma", 0.0)), path),
         light_turn=_read_turn(entry.get("light_rotation"), index, path),

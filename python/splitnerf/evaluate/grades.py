@@ -40,7 +40,7 @@ SCORES = (
 
 
 def graded(evaluation: Mapping) -> list[dict]:
-    """For each score that is there: `name`, `value` and `word` (good, fair or poor), and `scale`, where the words begin."""
+    """For each score that is there: `name`, `place`, `value` and `word` (good, fair or poor), and `scale`, where the words begin."""
     rows = []
     for score in SCORES:
         value = evaluation
@@ -52,5 +52,5 @@ def graded(evaluation: Mapping) -> list[dict]:
         word = "good" if sign * value >= sign * score.good else "poor" if sign * value < sign * score.poor else "fair"
         good, poor = (re.sub(r"\.0(?!\d)", "", score.text.format(limit)) for limit in (score.good, score.poor))
         scale = f"good from {good}, poor below {poor}" if sign > 0 else f"good up to {good}, poor above {poor}"
-        rows.append({"name": score.name, "value": score.text.format(value), "word": word, "scale": scale})
+        rows.append({"name": score.name, "place": score.place, "value": score.text.format(value), "word": word, "scale": scale})
     return rows
