@@ -128,7 +128,7 @@ class TrueField:
     def __init__(self, world_from_box: np.ndarray):
         self.scale, self.shift = world_from_box[0, 0], world_from_box[:3, 3]
 
-    def render(self, rays_o, rays_d, n_first, n, jitter=False, hidden=None):
+    def render(self, rays_o, rays_d, n_first, n, jitter=False, hidden=None, coloured=True):
         origins, rays = rays_o.double().numpy() * self.scale + self.shift, rays_d.double().numpy()
         if hidden is not None:
             middle = (CENTRE - self.shift) / self.scale

@@ -20,6 +20,7 @@ NEAR, FAR = 0.1, 300.0  # distances from the camera, scene units
 FULL_GRADIENT = 1.5  # distance from the camera from which samples have their whole gradient
 FIRST_LOG = -2.5  # of the density at the start, per scene unit: light passes the whole place
 LARGEST_LOG = 11.0  # of a density
+LEAST_WEIGHT = 1e-4  # of a sample whose colour is asked
 BLUR = 0.01  # weight that every interval of the first search keeps
 
 
@@ -27,14 +28,14 @@ class Rendered(NamedTuple):
     """The rendering of n rays with k samples each.
 
     Attributes:
-        colour: [n, 3] sRGB.
+        colour: [n, 3] sRGB; None where it was not asked for.
         weights: [n, k] shares of the colour; they sum to 1.
         distances: [n, k] from the camera, scene units, the middles of the samples.
         edges: [n, k + 1] the samples' limits in [0, 1], the rays' own measure.
         first_weights, first_edges: The same of the first search, [n, m] and [n, m + 1].
     """
 
-    colour: Tensor
+    colour: Tensor | None
     weights: Tensor
     distances: Tensor
     edges: Tensor
@@ -66,11 +67,11 @@ class RadianceField(nn.Module):
             for shape, cells in (FINE, COARSE)
         )
         self.trunk = nn.Sequential(
-            nn.Linear(self.fine.spec.n_outputs, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1 + FEATURES)
+            nn.Linear(self.fine.spec.n_outputs, WIDTH), nn.ReLU(True), nn.Linear(WIDTH, 1 + FEATURES)
         )
-        self.first = nn.Sequential(nn.Linear(self.coarse.spec.n_outputs, 16), nn.ReLU(), nn.Linear(16, 1))
+        self.first = nn.Sequential(nn.Linear(self.coarse.spec.n_outputs, 16), nn.ReLU(True), nn.Linear(16, 1))
         self.head = nn.Sequential(
-            nn.Linear(FEATURES + 9, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 3)
+            nn.Linear(FEATURES + 9, WIDTH), nn.ReLU(True), nn.Linear(WIDTH, WIDTH), nn.ReLU(True), nn.Linear(WIDTH, 3)
         )
 
     def render(
@@ -81,6 +82,7 @@ class RadianceField(nn.Module):
         n: int,
         jitter: bool = False,
         hidden: Callable[[Tensor], Tensor] | None = None,
+        coloured: bool = True,
     ) -> Rendered:
         """Renders rays.
 
@@ -89,6 +91,7 @@ class RadianceField(nn.Module):
             n_first, n: The numbers of samples of the first search and of the second one.
             jitter: Whether the samples stand at random places within their intervals.
             hidden: Tells of points [..., 3] whether they are left out; None: none is.
+            coloured: Whether colours are asked for.
         """
         measure = RayMeasure(rays_o, rays_d)
         edges = torch.linspace(0, 1, n_first + 1, device=rays_o.device).expand(len(rays_o), -1)
@@ -103,9 +106,14 @@ class RadianceField(nn.Module):
         middles = measure.distances(0.5 * (finer[:, 1:] + finer[:, :-1]))
         out = with_less_gradient(self.trunk(self._encoded(self.fine, points)), middles)
         weights = self._weights(self._without(out[..., 0] + FIRST_LOG, points, hidden), distances)
-        views = harmonics(rays_d)[:, None].expand(-1, n, -1)
-        colours = torch.sigmoid(self.head(torch.cat([out[..., 1:], views], dim=-1)))
-        return Rendered((weights[..., None] * colours).sum(1), weights, middles, finer, first, edges)
+        colour = self._colour(weights, out[..., 1:], rays_d) if coloured else None
+        return Rendered(colour, weights, middles, finer, first, edges)
+
+    def _colour(self, weights: Tensor, features: Tensor, rays_d: Tensor) -> Tensor:
+        """[n, 3] the sums of the samples' colours; those of samples [n, k] that hardly count are not asked."""
+        ray, sample = (weights.detach() > LEAST_WEIGHT).nonzero(as_tuple=True)
+        colours = torch.sigmoid(self.head(torch.cat([features[ray, sample], harmonics(rays_d)[ray]], dim=-1)))
+        return torch.zeros_like(rays_d).index_add(0, ray, weights[ray, sample, None] * colours)
 
     def _first_density(self, points: Tensor) -> Tensor:
         return self.first(self._encoded(self.coarse, points))[..., 0]

@@ -44,7 +44,7 @@ def coverage(field: RadianceField, region: Region, rays_o: Tensor, rays_d: Tenso
     """[n] the share of each ray's colour that comes from the region."""
     found = []
     for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
-        rendered = field.render(o, d, *SAMPLES)
+        rendered = field.render(o, d, *SAMPLES, coloured=False)
         distances = region.above_table(o, d, rendered.distances)
         found.append((rendered.weights * region.holds(o[:, None] + distances[..., None] * d[:, None])).sum(1))
     return torch.cat(found)
@@ -97,7 +97,7 @@ def _points(field: RadianceField, rays_o: Tensor, rays_d: Tensor) -> np.ndarray:
     for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
         if len(o) == 0:
             break
-        rendered = field.render(o, d, *SAMPLES)
+        rendered = field.render(o, d, *SAMPLES, coloured=False)
         at = (rendered.weights.cumsum(1) < 0.5).sum(1, keepdim=True).clamp(max=SAMPLES[1] - 1)
         points.append(o + rendered.distances.gather(1, at) * d)
     return torch.cat(points).numpy()

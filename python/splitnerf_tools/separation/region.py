@@ -59,14 +59,20 @@ class Region:
     def blocks(self, rays_o: Tensor, rays_d: Tensor) -> Tensor:
         """[n] bool, whether rays [n, 3] pass through a solid cell above the table's foot: an object that mirrors its surroundings
         looks as if one saw through it, but photos from elsewhere show its surface."""
-        middle = -(rays_o * rays_d).sum(1, keepdim=True)
-        steps = torch.arange(-REACH, REACH, HALF / CELLS)
-        distances = middle + steps
+        blocked, cells = torch.zeros(len(rays_o), dtype=torch.bool), self.solid.nonzero()
+        if len(cells) == 0:
+            return blocked
+        low, high = ((x * (2 / CELLS) - 1) * HALF for x in (cells.amin(0), cells.amax(0) + 1))
+        enters, leaves = torch.sort(torch.stack([(x - rays_o) / rays_d for x in (low, high)]), dim=0).values
+        near = (enters.amax(1) <= leaves.amin(1)).nonzero().squeeze(1)  # the others miss the box of all solid cells
+        rays_o, rays_d = rays_o[near], rays_d[near]
+        distances = -(rays_o * rays_d).sum(1, keepdim=True) + torch.arange(-REACH, REACH, HALF / CELLS)
         points = rays_o[:, None] + distances[..., None] * rays_d[:, None]
         solid = _at(self.solid, points) & (distances > 0)
         if self.table is not None:
             solid &= self.table.heights(points) > LOW
-        return solid.any(1)
+        blocked[near] = solid.any(1)
+        return blocked
 
     def cell_pixels(self, size: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> float:
         """The edge of a cell in the middle of the object, in pixels of an image [h, w] with rays [h w, 3]."""
