@@ -14,7 +14,7 @@ from splitnerf.ops import MeshScene
 from splitnerf.refinement import outline
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.fit import FitSettings
-from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, unit
+from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, power_of, unit
 from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.stage import Stage
@@ -274,6 +274,16 @@ def test_a_sun_whose_glow_is_too_dim_gets_its_share(ball_over_plate):
     assert sun_to_sky(new) == pytest.approx(POWER.mean() / 0.3, rel=0.12)
 
 
+def test_where_the_rest_of_the_light_is_known_the_sun_alone_gets_brighter(ball_over_plate):
+    light = (0.5 * glowing_sky(12.0) + 0.15).astype(np.float32)  # half of the sun's power, under a true sky of 0.3
+    asset = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light))
+    new, lamp = compact_lamp(AssetTexels(asset), light, 3, 0, rest_is_known=True)
+    directions, areas = directions_of_texels(64)
+    away = degrees_from(directions, SUN)
+    assert ((new.mean(2) - 0.3) * areas)[away < 6].sum() == pytest.approx(POWER.mean(), rel=0.15)
+    np.testing.assert_array_equal(new[away > 60], light[away > 60])
+
+
 ASIDE = unit(np.cross(SUN, [0.0, 0.0, 1.0]))
 NO_LAMP = {  # a light, the radius of the lamp whose shadow the albedo shows, and what else is done to the albedo
     "too dark": (SUN, 0.3, 0.04),
@@ -317,3 +327,25 @@ def test_refinement_begins_with_the_compact_lamp(ball_over_plate):
     again = Stage(data, asset, light, settings, state)
     assert again.lamp == stage.lamp and torch.equal(again.fit.light.radiance(), stage.fit.light.radiance())
     assert Stage(data, asset, light, dataclasses.replace(settings, light_step=0.0)).lamp is None
+
+
+def test_under_a_stronger_lamp_in_a_light_that_photos_show_the_albedo_begins_darker(ball_over_plate):
+    """But for metals; also after an interruption."""
+    light = (0.5 * glowing_sky(12.0) + 0.15).astype(np.float32)
+    gloss = np.zeros((SIZE, SIZE, 2), np.float32)
+    gloss[..., 0], gloss[:, : SIZE // 8, 1] = 0.8, 1.0
+    asset = with_textures(
+        ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light), roughness_metallic_texture=gloss
+    )
+    settings = FitSettings(sweeps=1, sweep_share=0.05, pixels=200, directions=4, outline=False)
+    seen = np.full((16, 32, 4), 0.3, np.float32)
+    data = dataclasses.replace(photos(ball_over_plate, light, n=3, spp=4), surroundings=seen)
+    stage = Stage(data, asset, light, settings)
+    before, after = AssetTexels(asset).start, stage.fit.texels.start
+    factor = power_of(stage.fit.light.radiance().numpy()) / power_of(light)
+    metal = before[:, 4] > 0.99
+    assert stage.lamp is not None and factor > 1.3 and metal.any()
+    torch.testing.assert_close(after[metal], before[metal])
+    torch.testing.assert_close(after[~metal, :3], before[~metal, :3] / factor, rtol=1e-3, atol=1e-4)
+    again = Stage(data, asset, light, settings, stage.state())
+    assert torch.equal(again.fit.texels.start, after)

@@ -27,8 +27,8 @@ from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
 from splitnerf.refinement.control_variate import centred, white_sums
-from splitnerf.refinement.lamps import CompactLamp, compact_lamp
-from splitnerf.refinement.level import at_level, level_of_light
+from splitnerf.refinement.lamps import CompactLamp, compact_lamp, power_of
+from splitnerf.refinement.level import at_level, level_of_light, under_lamp
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
@@ -186,10 +186,13 @@ class Refinement:
         self.trained = self.texels.start, torch.from_numpy(environment)
         self.begin_at(1.0)
 
-    def begin_at(self, level: float) -> None:
-        """Begins the fit with the asset as it was given, under its light made brighter by a factor."""
-        (values, light), self.level = self.trained, level
+    def begin_at(self, level: float, lamp: float = 1.0) -> None:
+        """Begins the fit with the asset as it was given, under its light made brighter by a factor `level`; what is no metal is made
+        darker by a factor `lamp` too."""
+        (values, light), self.level, self.lamp = self.trained, level, lamp
         self.texels.start = values if level == 1.0 else at_level(values, level)
+        if lamp != 1.0:
+            self.texels.start = under_lamp(self.texels.start, lamp)
         self.light = EnvironmentLight(light * level)
         self.light_equations = LightEquations(self.light, surroundings=self.seen)
         self.unknowns = to_unknowns(self.texels.start)
@@ -212,15 +215,20 @@ class Refinement:
         """Makes the brightest lobe of the light compact if the albedo shows the edge of its shadow; else None."""
         if self.turns is not None:  # its shadow would stand elsewhere in each photo
             return None
-        light, lamp = compact_lamp(self.texels, self.light.radiance().numpy(), self.patch_width, self.settings.seed)
+        light = self.light.radiance().numpy()
+        changed, lamp = compact_lamp(
+            self.texels, light, self.patch_width, self.settings.seed, rest_is_known=self.seen is not None
+        )
         if lamp is not None:
-            self.light.set_radiance(torch.from_numpy(light))
+            self.begin_at(self.level, power_of(changed) / power_of(light) if self.seen is not None else 1.0)
+            self.light.set_radiance(torch.from_numpy(changed))
         return lamp
 
     def state(self) -> dict[str, object]:
         """The state that further sweeps depend on, without the arguments, as tensors and plain values."""
         return {
             "level": self.level,
+            "lamp": self.lamp,
             "unknowns": self.unknowns,
             "curvature": self.equations.curvature,
             "gradient": self.equations.gradient,
@@ -236,7 +244,7 @@ class Refinement:
         Raises:
             ValueError, KeyError, TypeError: The state belongs to another fit.
         """
-        self.begin_at(float(state["level"]))
+        self.begin_at(float(state["level"]), float(state["lamp"]))
         sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient}
         for name, tensor in sums.items():
             check_tensor(name, state[name], tuple(tensor.shape), torch.float32)

@@ -5,7 +5,8 @@ takes the edges of the sun's shadow. Light and albedo together then explain the 
 them. But the true albedo does not depend on shadows: of two close points, one in the shadow of a part of the lobe and
 one outside it, it is the same on average over many pairs. If the lobe stands for a compact lamp, the albedo outside the
 shadow is instead brighter by what the lamp adds there. So the lamp's direction, width and power are those that leave
-the smallest contrasts between such points. The light of the lobe is then made compact; the power of all light stays.
+the smallest contrasts between such points. The light of the lobe is then made compact. The power of all light stays; but where photos
+show what else shines on the object, that stays, and the albedo takes the change.
 """
 
 from __future__ import annotations
@@ -257,7 +258,7 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
 
 
 def compact_lamp(
-    texels: AssetTexels, light: np.ndarray, patch: int, seed: int
+    texels: AssetTexels, light: np.ndarray, patch: int, seed: int, *, rest_is_known: bool = False
 ) -> tuple[np.ndarray, CompactLamp | None]:
     """The light with its brightest lobe made compact, if the albedo indicates a compact lamp.
 
@@ -266,10 +267,10 @@ def compact_lamp(
         light: [h, 2 h, 3] linear radiance, h at least 8.
         patch: The width of two pixels of the photos in texels.
         seed: Of the choice of pairs.
+        rest_is_known: Whether the level of the light beside the lobe is known.
 
     Returns:
-        The light, and what was found: None where the lobe stays as it is. So it does where the best lamp is the
-            broadest that is
+        The light, and what was found: None where the lobe stays as it is. So it does where the best lamp is the broadest that is
         tried, or within FINER of the farthest: there may be a better one beyond. The largest power is taken.
     """
     lobe = brightest_lobe(light)
@@ -287,16 +288,21 @@ def compact_lamp(
     if at_rim or best.factor < LEAST_FACTOR or not gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(n_pairs):
         return light, None
     found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
-    return with_lamp(light, lobe, found), found
+    return with_lamp(light, lobe, found, rest_is_known), found
 
 
-def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp) -> np.ndarray:
-    """A map [h, 2 h, 3] of the same power with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a
-    lobe."""
+def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp, rest_is_known: bool) -> np.ndarray:
+    """A map [h, 2 h, 3] with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a lobe; of the same power, unless the
+    rest is known."""
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
     inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())
     changed = light - lobe.radiance
     changed[inside] += lamp.factor * lobe.power / areas[inside].sum()
-    power_of = lambda map_: (map_.mean(axis=2) * areas).sum()  # noqa: E731
-    return (changed * (power_of(light) / power_of(changed))).astype(np.float32)
+    scale = 1.0 if rest_is_known else power_of(light) / power_of(changed)
+    return (changed * scale).astype(np.float32)
+
+
+def power_of(light: np.ndarray) -> float:
+    """The integral of the mean radiance of a map [h, 2 h, 3] over all directions."""
+    return float((light.mean(axis=2) * directions_of_texels(light.shape[0])[1]).sum())

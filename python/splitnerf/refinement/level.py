@@ -43,6 +43,12 @@ def at_level(values: Tensor, factor: float) -> Tensor:
     return torch.cat([scattered, values[:, 3:4], metallic, values[:, 5:]], dim=1)
 
 
+def under_lamp(values: Tensor, factor: float) -> Tensor:
+    """The texture values [m, 8] with an albedo that is darker by a factor but for metals, which mirror the rest of the light too."""
+    albedo, metallic = values[:, :3], values[:, 4:5]
+    return torch.cat([albedo * (metallic + (1 - metallic) / factor), values[:, 3:]], dim=1)
+
+
 def _reflectance(values: Tensor) -> Tensor:
     """[m] F0, mean over the colours."""
     albedo, metallic = values[:, :3], values[:, 4:5]
