@@ -14,7 +14,16 @@ from splitnerf.ops import MeshScene
 from splitnerf.refinement import outline
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.fit import FitSettings
-from splitnerf.refinement.lamps import Points, brightest_lobe, compact_lamp, degrees_from, disc, parts_of_light, power_of, unit
+from splitnerf.refinement.lamps import (
+    Points,
+    brightest_lobe,
+    compact_lamp,
+    degrees_from,
+    disc,
+    parts_of_light,
+    power_of,
+    unit,
+)
 from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.stage import Stage

@@ -22,7 +22,15 @@ from splitnerf_tools.separation import training
 from splitnerf_tools.separation.field import RadianceField, Rendered
 from splitnerf_tools.separation.foot import find_foot
 from splitnerf_tools.separation.ground import Table, find_table
-from splitnerf_tools.separation.masks import _points, at_edges, behind, find_mask, view_rays, with_mirrors, without_specks
+from splitnerf_tools.separation.masks import (
+    _points,
+    at_edges,
+    behind,
+    find_mask,
+    view_rays,
+    with_mirrors,
+    without_specks,
+)
 from splitnerf_tools.separation.region import CELLS, Region, find_region
 from tiny_runs import train
 

@@ -134,7 +134,9 @@ class Dataset:
             return None
         image = read_image(path)
         if image.shape[2] != 4 or abs(image.shape[0] * width - image.shape[1] * height) > 2 * max(width, height):
-            raise InputError(f"{path}: must be RGBA and of its photo's shape, {width}x{height}; make it again, or leave it out")
+            raise InputError(
+                f"{path}: must be RGBA and of its photo's shape, {width}x{height}; make it again, or leave it out"
+            )
         image[..., :3] *= image[..., 3:]
         planes = torch.from_numpy(image).permute(2, 0, 1)[None]
         planes = interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)[0]

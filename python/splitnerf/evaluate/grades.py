@@ -52,5 +52,7 @@ def graded(evaluation: Mapping) -> list[dict]:
         word = "good" if sign * value >= sign * score.good else "poor" if sign * value < sign * score.poor else "fair"
         good, poor = (re.sub(r"\.0(?!\d)", "", score.text.format(limit)) for limit in (score.good, score.poor))
         scale = f"good from {good}, poor below {poor}" if sign > 0 else f"good up to {good}, poor above {poor}"
-        rows.append({"name": score.name, "place": score.place, "value": score.text.format(value), "word": word, "scale": scale})
+        rows.append(
+            {"name": score.name, "place": score.place, "value": score.text.format(value), "word": word, "scale": scale}
+        )
     return rows

@@ -91,11 +91,7 @@ def edge_runs(
 
 
 def edge_of(
-    colours: np.ndarray,
-    alpha: np.ndarray,
-    known: np.ndarray | None,
-    width: int,
-    told: np.ndarray | None = None,
+    colours: np.ndarray, alpha: np.ndarray, known: np.ndarray | None, width: int, told: np.ndarray | None = None
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """The pixels of a photo within `width` pixels of its mask's edges as runs (see :func:`runs_of`), and the sRGB
     colours [k, 3] uint8 behind the object there: those of `told` (see :meth:`splitnerf.data.dataset.Dataset.behind`), elsewhere
@@ -261,7 +257,9 @@ class PixelSource:
                 known.append(runs_of(known_here))
             if edge_pixels and dataset.whole:
                 known_here = None if known_here is None else known_here.numpy()
-                edges.append(edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels, dataset.behind(i)))
+                edges.append(
+                    edge_of(dataset.images.codes[i, ..., :3], alpha, known_here, edge_pixels, dataset.behind(i))
+                )
             near.append(runs_of(wide))
             possible.append(reduced(seen, self._factor))
             del alpha, mask, wide, seen, known_here
