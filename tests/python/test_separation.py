@@ -25,9 +25,9 @@ from splitnerf_tools.separation.ground import Table, find_table
 from splitnerf_tools.separation.masks import (
     _points,
     at_edges,
-    behind,
     find_mask,
     view_rays,
+    with_background,
     with_mirrors,
     without_specks,
 )
@@ -235,12 +235,26 @@ def test_what_is_behind_is_not_told_where_the_field_shows_something_else(tmp_pat
     masks = write_ball_on_floor(tmp_path, 8)
     photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
     field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
-    alone = behind(field, region, photos, 0, masks[0].astype(np.float32))
+    mask, alone = with_background(field, region, photos, 0, masks[0].astype(np.float32))
+    np.testing.assert_array_equal(mask > 0.5, masks[0])
     images = np.array(photos.images)
     images[0, :, : SIZE // 2, :3] = 1 - images[0, :, : SIZE // 2, :3]
-    crossed = behind(field, region, replace(photos, images=images), 0, masks[0].astype(np.float32))
+    mask, crossed = with_background(field, region, replace(photos, images=images), 0, masks[0].astype(np.float32))
+    np.testing.assert_array_equal(mask[:, : SIZE // 2 - 4] > 0.5, masks[0][:, : SIZE // 2 - 4])
     assert (alone[:, : SIZE // 2, 3] > 0).sum() > 50 and not crossed[:, : SIZE // 2 - 4].any()
     np.testing.assert_array_equal(crossed[:, SIZE // 2 + 12 :], alone[:, SIZE // 2 + 12 :])
+
+
+def test_what_looks_unlike_its_background_belongs_to_the_mask_beside_it(tmp_path):
+    """A mask that lost a rim on one side, as where a mirror looks transparent, gets it back, and nothing else."""
+    masks = write_ball_on_floor(tmp_path, 8)
+    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
+    right = np.flatnonzero(masks[0].any(axis=0)).max()
+    cut = masks[0] & (np.arange(SIZE) < right - 4)
+    mask = with_background(field, region, photos, 0, cut.astype(np.float32))[0] > 0.5
+    lost, extra = (masks[0] & ~mask).sum(), (mask & ~masks[0]).sum()
+    assert (masks[0] & ~cut).sum() > 40 and lost < 6 and extra < 6
 
 
 def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):

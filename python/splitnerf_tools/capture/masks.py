@@ -23,7 +23,7 @@ from splitnerf_tools.capture.photographs import Photograph
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
 from splitnerf_tools.separation.ground import Table
-from splitnerf_tools.separation.masks import behind, find_mask, surface_points
+from splitnerf_tools.separation.masks import find_mask, surface_points, with_background
 from splitnerf_tools.separation.separate import find_object, table_under
 from splitnerf_tools.separation.training import train_field
 
@@ -34,7 +34,7 @@ def find_masks(
     out: Path, world: World, seed: int, turntable: bool, report: Callable[[float], None]
 ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """The masks [h, w] in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own, and what is behind
-    the object, see :func:`splitnerf_tools.separation.masks.behind`; None on a turntable, where it moves.
+    the object, see :func:`splitnerf_tools.separation.masks.with_background`; None on a turntable, where it moves.
 
     Args:
         out: The folder of the undistorted photos.
@@ -54,7 +54,7 @@ def find_masks(
     region = find_object(field, photos, table, points)
     for i in range(len(photos)):
         mask = find_mask(field, region, photos, i)
-        yield mask, None if turntable else behind(field, region, photos, i, mask)
+        yield (mask, None) if turntable else with_background(field, region, photos, i, mask)
         report(0.8 + 0.2 * (i + 1) / len(photos))
 
 

@@ -23,8 +23,12 @@ CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 RIM, WIDEST_RIM = 3, 32  # every other pixel beside a mask in which solid cells say nothing, at least and at most
-BESIDE = 4  # pixels on both sides of a mask's edge, in which what is behind the object is told
-MISFIT = 0.1  # of the field from the photo there, root mean square in sRGB, up to which it is believed
+BESIDE, OUTSIDE = (
+    4,
+    10,
+)  # pixels on both sides of a mask's edge in which the background is told; outside, in which parts are looked for
+UNLIKE = 0.15  # difference of a pixel's colour from the background's of its neighbourhood, sRGB, from which it is the object's
+MISFIT = 0.1  # of the field from the photo at the outer end, root mean square in sRGB, up to which it is believed
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
 HINT, CERTAIN = 0.1, 50.0  # what the mask counts there beside a neighbour of the pixel's own colour, and beyond
 # Size of a mask's part, as a share of its largest, below which it goes; coverage that joins parts.
@@ -181,14 +185,27 @@ def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Te
 
 
 @torch.no_grad()
-def behind(field: RadianceField, region: Region, dataset: Dataset, index: int, mask: np.ndarray) -> np.ndarray:
-    """[h, w, 4] in [0, 1], what a view would show without the object along the edges of its mask [h, w]: sRGB at the view's
-    exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, and where the field shows
-    something else than the photo does beside the object."""
+def with_background(
+    field: RadianceField, region: Region, dataset: Dataset, index: int, mask: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A mask with what beside it looks unlike its background, and the background.
+
+    A glossy outline that mirrors the surroundings looks transparent to the field, but not like what is behind it.
+
+    Args:
+        field, region: The whole place, and the object in it.
+        dataset: The photos.
+        index: The photo.
+        mask: [h, w] its mask.
+
+    Returns:
+        The mask [h, w], and [h, w, 4] in [0, 1] what the photo would show without the object, along the mask's edges: sRGB at the photo's
+        exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, and where the field
+        shows something else than the photo does farther out.
+    """
     inside = mask > 0.5
-    near = ndimage.binary_dilation(inside, iterations=BESIDE) & ~ndimage.binary_erosion(
-        inside, iterations=BESIDE, border_value=1
-    )
+    out = ndimage.distance_transform_edt(~inside)
+    near = (out <= OUTSIDE) & ~ndimage.binary_erosion(inside, iterations=BESIDE, border_value=1)
     chosen = torch.from_numpy(np.flatnonzero(near))
     rays_o, rays_d = view_rays(dataset, index, mask.shape)
     shown, known = np.zeros((mask.size, 3), np.float32), np.zeros(mask.size, bool)
@@ -197,12 +214,22 @@ def behind(field: RadianceField, region: Region, dataset: Dataset, index: int, m
         shown[part] = field.render(o, d, *SAMPLES, hidden=region.holds).colour.clamp(0, 1)
         known[part] = ~region.stands_at(o, d)
     shown, known = shown.reshape(*mask.shape, 3), known.reshape(mask.shape)
-    outside = near & ~ndimage.binary_dilation(inside, iterations=BESIDE // 2)
-    apart = np.square(shown - _photo(dataset, index, mask.shape).clip(0, 1)).mean(-1) * outside
-    misfit, share = (ndimage.gaussian_filter(x.astype(np.float32), BESIDE) for x in (apart, outside))
+    photo = _photo(dataset, index, mask.shape).clip(0, 1)
+    far = near & (out > OUTSIDE - BESIDE)
+    apart = np.square(shown - photo).mean(-1) * far
+    misfit, share = (ndimage.gaussian_filter(x.astype(np.float32), OUTSIDE / 2) for x in (apart, far))
     known &= misfit < MISFIT**2 * share
+    least, most = (filter_(shown, (3, 3, 1)) for filter_ in (ndimage.minimum_filter, ndimage.maximum_filter))
+    unlike = np.sqrt(np.square(photo - photo.clip(least, most)).mean(-1)) > UNLIKE
+    grown = inside | (unlike & known & (out < OUTSIDE - 1))
+    parts, _ = ndimage.label(ndimage.binary_opening(grown, np.ones((3, 3))) | inside)
+    added = np.isin(parts, np.unique(parts[inside])) & ~inside
+    mask, inside = np.where(added, np.float32(1), mask), inside | added
+    known &= ndimage.binary_dilation(inside, iterations=BESIDE) & ~ndimage.binary_erosion(
+        inside, iterations=BESIDE, border_value=1
+    )
     exposed = linear_to_srgb(srgb_to_linear(shown) * np.float32(dataset.exposures[index])).clip(0, 1)
-    return np.concatenate([exposed, np.ones_like(shown[..., :1])], axis=-1) * known[..., None]
+    return mask, np.concatenate([exposed, np.ones_like(shown[..., :1])], axis=-1) * known[..., None]
 
 
 @torch.no_grad()

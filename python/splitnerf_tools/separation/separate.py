@@ -18,7 +18,7 @@ from splitnerf.progress import Progress, ended_by_signals, tracked
 
 from splitnerf_tools.separation.field import RadianceField
 from splitnerf_tools.separation.ground import Table, find_table
-from splitnerf_tools.separation.masks import behind, find_mask, points_near, surface_points, surroundings
+from splitnerf_tools.separation.masks import find_mask, points_near, surface_points, surroundings, with_background
 from splitnerf_tools.separation.region import Region, find_region
 from splitnerf_tools.separation.training import train_field
 
@@ -131,8 +131,9 @@ def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Pa
     """Writes the masks of a split and what is behind the object; returns the share [n] that each covers."""
     shares = []
     for i in tracked(range(len(split)), "masks, photo"):
-        mask, name = find_mask(field, region, split, i), separated_mask(split.image_paths[i], split.root)
-        for path, picture in ((folder / name, mask), (folder / BEHIND / name, behind(field, region, split, i, mask))):
+        mask, behind = with_background(field, region, split, i, find_mask(field, region, split, i))
+        name = separated_mask(split.image_paths[i], split.root)
+        for path, picture in ((folder / name, mask), (folder / BEHIND / name, behind)):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_image(path, picture)
         shares.append(mask.mean())
