@@ -230,8 +230,8 @@ def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(
         assert np.abs(picture[..., :3] - floor)[told[i]].max() < 0.01
 
 
-def test_what_is_behind_is_not_told_where_the_field_shows_something_else(tmp_path):
-    """Somebody walks through the left half of a photo; a turntable's surroundings move in all of them."""
+def test_no_background_is_told_for_a_photo_that_shows_something_else(tmp_path):
+    """Somebody walks through the left half of it."""
     masks = write_ball_on_floor(tmp_path, 8)
     photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
     field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
@@ -240,9 +240,8 @@ def test_what_is_behind_is_not_told_where_the_field_shows_something_else(tmp_pat
     images = np.array(photos.images)
     images[0, :, : SIZE // 2, :3] = 1 - images[0, :, : SIZE // 2, :3]
     mask, crossed = with_background(field, region, replace(photos, images=images), 0, masks[0].astype(np.float32))
-    np.testing.assert_array_equal(mask[:, : SIZE // 2 - 4] > 0.5, masks[0][:, : SIZE // 2 - 4])
-    assert (alone[:, : SIZE // 2, 3] > 0).sum() > 50 and not crossed[:, : SIZE // 2 - 4].any()
-    np.testing.assert_array_equal(crossed[:, SIZE // 2 + 12 :], alone[:, SIZE // 2 + 12 :])
+    np.testing.assert_array_equal(mask > 0.5, masks[0])
+    assert (alone[..., 3] > 0).sum() > 100 and not crossed.any()
 
 
 def test_what_looks_unlike_its_background_belongs_to_the_mask_beside_it(tmp_path):

@@ -200,8 +200,8 @@ def with_background(
 
     Returns:
         The mask [h, w], and [h, w, 4] in [0, 1] what the photo would show without the object, along the mask's edges: sRGB at the photo's
-        exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, and where the field
-        shows something else than the photo does farther out.
+        exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, nor for a photo
+        that looks unlike the field farther out.
     """
     inside = mask > 0.5
     out = ndimage.distance_transform_edt(~inside)
@@ -216,9 +216,7 @@ def with_background(
     shown, known = shown.reshape(*mask.shape, 3), known.reshape(mask.shape)
     photo = _photo(dataset, index, mask.shape).clip(0, 1)
     far = near & (out > OUTSIDE - BESIDE)
-    apart = np.square(shown - photo).mean(-1) * far
-    misfit, share = (ndimage.gaussian_filter(x.astype(np.float32), OUTSIDE / 2) for x in (apart, far))
-    known &= misfit < MISFIT**2 * share
+    known &= far.any() and bool(np.square(shown - photo)[far].mean() < MISFIT**2)
     least, most = (filter_(shown, (3, 3, 1)) for filter_ in (ndimage.minimum_filter, ndimage.maximum_filter))
     unlike = np.sqrt(np.square(photo - photo.clip(least, most)).mean(-1)) > UNLIKE
     grown = inside | (unlike & known & (out < OUTSIDE - 1))
