@@ -111,7 +111,7 @@ class RadianceField(nn.Module):
 
     def _colour(self, weights: Tensor, features: Tensor, rays_d: Tensor) -> Tensor:
         """[n, 3] the sums of the samples' colours; those of samples [n, k] that hardly count are not asked."""
-        ray, sample = (weights.detach() > LEAST_WEIGHT).nonzero(as_tuple=True)
+        ray, sample = (~(weights.detach() <= LEAST_WEIGHT)).nonzero(as_tuple=True)  # NaN too
         colours = torch.sigmoid(self.head(torch.cat([features[ray, sample], harmonics(rays_d)[ray]], dim=-1)))
         return torch.zeros_like(rays_d).index_add(0, ray, weights[ray, sample, None] * colours)
 
