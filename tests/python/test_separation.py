@@ -244,6 +244,16 @@ def test_no_background_is_told_for_a_photo_that_shows_something_else(tmp_path):
     assert (alone[..., 3] > 0).sum() > 100 and not crossed.any()
 
 
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_photos_without_the_object_and_filled_by_it_tell_no_background(tmp_path, share):
+    write_ball_on_floor(tmp_path, 8)
+    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    given, region = np.full((SIZE, SIZE), share, np.float32), Region(np.ones((CELLS,) * 3, bool), None)
+    mask, picture = with_background(RadianceField(), region, photos, 0, given)
+    np.testing.assert_array_equal(mask, given)
+    assert picture.shape == (SIZE, SIZE, 4) and not picture.any()
+
+
 def test_what_looks_unlike_its_background_belongs_to_the_mask_beside_it(tmp_path):
     """A mask that lost a rim on one side, as where a mirror looks transparent, gets it back, and nothing else."""
     masks = write_ball_on_floor(tmp_path, 8)

@@ -149,12 +149,16 @@ def without_specks(mask: np.ndarray) -> np.ndarray:
     return np.where((sizes < SPECK * sizes.max())[parts] & (parts > 0), 0, mask).astype(np.float32)
 
 
+def along_edges(inside: np.ndarray, width: int) -> np.ndarray:
+    """[h, w] bool, the pixels within some pixels of the edges of a mask [h, w] bool; the photo's border is no edge."""
+    core = ndimage.binary_erosion(inside, iterations=width, border_value=1)
+    return ndimage.binary_dilation(inside, iterations=width) & ~core
+
+
 def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
     """A mask [h, w] whose outline is moved, by a few pixels at most, to where the photo's [h, w, 3] colours change."""
     inside = mask > 0.5
-    near = ndimage.binary_dilation(inside, iterations=BAND) & ~ndimage.binary_erosion(
-        inside, iterations=BAND, border_value=1
-    )
+    near = along_edges(inside, BAND)
     hints = np.where(near, HINT * (2 * mask - 1), np.where(inside, CERTAIN, -CERTAIN))
     shares = random_walk(hints, photo, ndimage.binary_dilation(near), CONTRAST)
     return np.where(near, shares, inside).astype(np.float32)
@@ -205,7 +209,9 @@ def with_background(
     """
     inside = mask > 0.5
     out = ndimage.distance_transform_edt(~inside)
-    near = (out <= OUTSIDE) & ~ndimage.binary_erosion(inside, iterations=BESIDE, border_value=1)
+    near = along_edges(inside, BESIDE) | (~inside & (out <= OUTSIDE))
+    if not near.any():  # the object fills the photo
+        return mask, np.zeros((*mask.shape, 4), np.float32)
     chosen = torch.from_numpy(np.flatnonzero(near))
     rays_o, rays_d = view_rays(dataset, index, mask.shape)
     shown, known = np.zeros((mask.size, 3), np.float32), np.zeros(mask.size, bool)
@@ -223,9 +229,7 @@ def with_background(
     parts, _ = ndimage.label(ndimage.binary_opening(grown, np.ones((3, 3))) | inside)
     added = np.isin(parts, np.unique(parts[inside])) & ~inside
     mask, inside = np.where(added, np.float32(1), mask), inside | added
-    known &= ndimage.binary_dilation(inside, iterations=BESIDE) & ~ndimage.binary_erosion(
-        inside, iterations=BESIDE, border_value=1
-    )
+    known &= along_edges(inside, BESIDE)
     exposed = linear_to_srgb(srgb_to_linear(shown) * np.float32(dataset.exposures[index])).clip(0, 1)
     return mask, np.concatenate([exposed, np.ones_like(shown[..., :1])], axis=-1) * known[..., None]
 
