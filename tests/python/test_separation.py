@@ -217,7 +217,10 @@ def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(
     """Or for a wall: before what all points lie on, the object is cut from it."""
     masks = write_ball_on_floor(tmp_path)
     monkeypatch.setattr(capture_masks, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
-    found = list(capture_masks.find_masks(tmp_path, SimpleNamespace(table=False), 0, False, lambda share: None))
+    told_of = []
+    found = capture_masks.find_masks(tmp_path, SimpleNamespace(table=False), 0, False, told_of.append)
+    found = [one for _, one in zip(masks, found)]  # as many as there are photos are asked for
+    assert told_of[-1] == 1.0
     shares = [((a > 0.5) & b).sum() / ((a > 0.5) | b).sum() for (a, _), b in zip(found, masks)]
     assert np.mean(shares) > 0.9
     told = [picture[..., 3] > 0 for _, picture in found]

@@ -127,16 +127,12 @@ class Dataset:
         known, along the mask's edges, else 0; None where the data do not say.
 
         Raises:
-            InputError: The file cannot be read, or has another shape than the photo.
+            InputError: The file cannot be read.
         """
         path, (height, width) = self.behind_paths[view], self.sizes[view].tolist()
         if path is None:
             return None
         image = read_image(path)
-        if image.shape[2] != 4 or abs(image.shape[0] * width - image.shape[1] * height) > 2 * max(width, height):
-            raise InputError(
-                f"{path}: must be RGBA and of its photo's shape, {width}x{height}; make it again, or leave it out"
-            )
         image[..., :3] *= image[..., 3:]
         planes = torch.from_numpy(image).permute(2, 0, 1)[None]
         planes = interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)[0]
@@ -277,6 +273,11 @@ def load_dataset(
     intrinsics = np.stack([lens_intrinsics(frame.lens, photo.size) for frame, photo in zip(frames, photos)]) / downscale
     poses = np.stack([frame.pose for frame in frames])
     poses[:, :3, 3] = poses[:, :3, 3] @ box_from_world[:3, :3].T + box_from_world[:3, 3]
+    whole, behind_paths = all(photo.whole for photo in photos), [_behind_path(frame, root, reading) for frame in frames]
+    if any(frame.behind_path for frame in frames) and not whole:
+        note_once(
+            f"{root}: 'behind_path' is not used: the photos have an alpha of their own, or --downscale averages them"
+        )
     return Dataset(
         name=root.resolve().name,
         root=root,
@@ -295,9 +296,9 @@ def load_dataset(
         stated=np.array([frame.exposure for frame in frames]),
         surroundings=_surroundings(root, reading),
         light_turns=_light_turns(frames),
-        behind_paths=[_behind_path(frame, root, reading) for frame in frames],
+        behind_paths=behind_paths,
         masked=_has_masks(photos),
-        whole=all(photo.whole for photo in photos),
+        whole=whole,
     )
 
 

@@ -152,7 +152,7 @@ def resized_mask(mask: np.ndarray, height: int, width: int) -> np.ndarray:
 def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bool]:
     """The sizes [n, 2] (height, width) of the photos, and whether bytes hold their values exactly, by the files'
     headers alone. Raises InputError where a file is missing or no image, a photo has another shape than its lens says,
-    a mask has another size than its photo, or a photo is too small for the downscale."""
+    a mask has another size than its photo, a background another shape, or a photo is too small for the downscale."""
     sizes, exact = [], downscale == 1 and all(frame.distortion is None for frame in frames)
     for frame in frames:
         path = frame.image_path
@@ -172,6 +172,12 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bo
                     "same size"
                 )
             exact = exact and mask.bits == 8
+        if frame.behind_path is not None:
+            h, w, channels, _ = read_header(frame.behind_path)
+            if channels != 4 or abs(h * width - w * height) > 2 * max(width, height):
+                raise InputError(
+                    f"{frame.behind_path}: must be RGBA and of its photo's shape, {width}x{height}; make it again, or leave it out"
+                )
     _check_lenses(frames, sizes)
     return np.array(sizes), exact
 

@@ -186,13 +186,13 @@ class Refinement:
         self.trained = self.texels.start, torch.from_numpy(environment)
         self.begin_at(1.0)
 
-    def begin_at(self, level: float, lamp: float = 1.0) -> None:
-        """Begins the fit with the asset as it was given, under its light made brighter by a factor `level`; what is no metal is made
-        darker by a factor `lamp` too."""
-        (values, light), self.level, self.lamp = self.trained, level, lamp
+    def begin_at(self, level: float, lamp_gain: float = 1.0) -> None:
+        """Begins the fit with the asset as it was given, under its light made brighter by a factor `level`; what is no metal is
+        made darker by `lamp_gain` too, the factor of all light's power by a lamp that is set afterwards."""
+        (values, light), self.level, self.lamp_gain = self.trained, level, lamp_gain
         self.texels.start = values if level == 1.0 else at_level(values, level)
-        if lamp != 1.0:
-            self.texels.start = under_lamp(self.texels.start, lamp)
+        if lamp_gain != 1.0:
+            self.texels.start = under_lamp(self.texels.start, lamp_gain)
         self.light = EnvironmentLight(light * level)
         self.light_equations = LightEquations(self.light, surroundings=self.seen)
         self.unknowns = to_unknowns(self.texels.start)
@@ -215,12 +215,10 @@ class Refinement:
         """Makes the brightest lobe of the light compact if the albedo shows the edge of its shadow; else None."""
         if self.turns is not None:  # its shadow would stand elsewhere in each photo
             return None
-        light = self.light.radiance().numpy()
-        changed, lamp = compact_lamp(
-            self.texels, light, self.patch_width, self.settings.seed, rest_is_known=self.seen is not None
-        )
+        light, known = self.light.radiance().numpy(), self.seen is not None
+        changed, lamp = compact_lamp(self.texels, light, self.patch_width, self.settings.seed, rest_is_known=known)
         if lamp is not None:
-            self.begin_at(self.level, power_of(changed) / power_of(light) if self.seen is not None else 1.0)
+            self.begin_at(self.level, power_of(changed) / power_of(light) if known else 1.0)
             self.light.set_radiance(torch.from_numpy(changed))
         return lamp
 
@@ -228,7 +226,7 @@ class Refinement:
         """The state that further sweeps depend on, without the arguments, as tensors and plain values."""
         return {
             "level": self.level,
-            "lamp": self.lamp,
+            "lamp_gain": self.lamp_gain,
             "unknowns": self.unknowns,
             "curvature": self.equations.curvature,
             "gradient": self.equations.gradient,
@@ -244,7 +242,7 @@ class Refinement:
         Raises:
             ValueError, KeyError, TypeError: The state belongs to another fit.
         """
-        self.begin_at(float(state["level"]), float(state["lamp"]))
+        self.begin_at(float(state["level"]), float(state["lamp_gain"]))
         sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient}
         for name, tensor in sums.items():
             check_tensor(name, state[name], tuple(tensor.shape), torch.float32)

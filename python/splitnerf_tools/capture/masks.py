@@ -54,8 +54,9 @@ def find_masks(
     region = find_object(field, photos, table, points)
     for i in range(len(photos)):
         mask = find_mask(field, region, photos, i)
-        yield (mask, None) if turntable else with_background(field, region, photos, i, mask)
+        found = (mask, None) if turntable else with_background(field, region, photos, i, mask)
         report(0.8 + 0.2 * (i + 1) / len(photos))
+        yield found
 
 
 def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:

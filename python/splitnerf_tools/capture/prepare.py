@@ -221,9 +221,10 @@ def write_data(
     settings: PrepareSettings,
     report: Callable[[str, float], None],
 ) -> np.ndarray:
-    """Writes `images/`, `masks/`, `behind/`, `transforms.json` and `surroundings.exr`; returns the share that each mask covers."""
+    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr`, and `behind/` with found masks; returns the share that each
+    mask covers."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
-    for folder in ("images", "masks", "behind"):
+    for folder in ("images", "masks"):
         (out / folder).mkdir(exist_ok=True)
     for i, (name, pinhole) in enumerate(zip(scene.names, pinholes)):
         photo = without_vignetting(read_upright(by_name[name].path), scene.lenses[i], exposures.vignetting)
@@ -243,10 +244,12 @@ def write_data(
             files.append({"mask_path": f"masks/{name}.png"})
             if behind is not None:
                 files[-1]["behind_path"] = f"behind/{name}.png"
+                (out / "behind").mkdir(exist_ok=True)
                 write_image(out / files[-1]["behind_path"], behind)
             shares.append(mask.mean())
     except BaseException:
-        (out / TRANSFORMS).unlink(missing_ok=True)  # data without their masks are half of the data
+        if mask_of is None:
+            (out / TRANSFORMS).unlink()  # data without their masks are half of the data
         raise
     _write_transforms(world, exposures, pinholes, out, files, turntable=settings.turntable)
     if not settings.turntable:  # what is around the object stands elsewhere in each photo

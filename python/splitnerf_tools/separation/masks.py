@@ -23,10 +23,8 @@ CHUNK = 4096  # rays
 LONGEST = 800  # edge of a mask in pixels
 COARSER = 4  # factor by which the first mask is smaller
 RIM, WIDEST_RIM = 3, 32  # every other pixel beside a mask in which solid cells say nothing, at least and at most
-BESIDE, OUTSIDE = (
-    4,
-    10,
-)  # pixels on both sides of a mask's edge in which the background is told; outside, in which parts are looked for
+# Pixels on both sides of a mask's edge in which the background is told, and outside of it, in which lost parts are looked for.
+BESIDE, OUTSIDE = 4, 10
 UNLIKE = 0.15  # difference of a pixel's colour from the background's of its neighbourhood, sRGB, from which it is the object's
 MISFIT = 0.1  # of the field from the photo at the outer end, root mean square in sRGB, up to which it is believed
 BAND = 3  # pixels on both sides of a mask's edge, in which the photo's colours move it
@@ -203,9 +201,9 @@ def with_background(
         mask: [h, w] its mask.
 
     Returns:
-        The mask [h, w], and [h, w, 4] in [0, 1] what the photo would show without the object, along the mask's edges: sRGB at the photo's
-        exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, nor for a photo
-        that looks unlike the field farther out.
+        The mask [h, w], and [h, w, 4] in [0, 1] what the photo would show without the object, along the mask's edges: sRGB at
+        the photo's exposure, and 1 where other photos tell it; else 0. They do not tell it below the object's foot, nor for a
+        photo that looks unlike the field farther out.
     """
     inside = mask > 0.5
     out = ndimage.distance_transform_edt(~inside)

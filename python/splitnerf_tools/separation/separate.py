@@ -47,7 +47,8 @@ class Separated:
 
 
 def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> Separated:
-    """Writes a mask for each photo, what is behind the object there, `surroundings.exr`, and `sheet.jpg`, which shows some of the masks, into an empty folder.
+    """Writes a mask for each photo, what is behind the object, `surroundings.exr`, and `sheet.jpg`, which shows some of the
+    masks, into an empty folder.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
     plane of a table if there is one, and hangs together in the middle, is the object.

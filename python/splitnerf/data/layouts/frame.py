@@ -34,8 +34,8 @@ class Frame:
         mask_kind: What the mask is: "object" (white is the object; it replaces the image's alpha), "ignore" (black is
             to be ignored), or "auto" where the layout leaves it open.
         dynamic_mask_path: A file that is white where the image is to be ignored, or None.
-        behind_path: The file with what the image would show without the object, see :meth:`splitnerf.data.dataset.Dataset.behind`, or
-            None.
+        behind_path: The file with what the image would show without the object, see
+            :meth:`splitnerf.data.dataset.Dataset.behind`, or None.
         exposure: The factor of the image's linear values.
         gamma: The exponent of its values that gives linear ones; 0 where its curve is sRGB's.
         light_turn: [3, 3] the rotation that carries directions of the data's world to those in which the light stands still, or
