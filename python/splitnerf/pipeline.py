@@ -219,7 +219,10 @@ def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, ob
         move_assets(run, run / TRAINED)
     observer(Event("refinement", path=run / TRAINED))
     settings = FitSettings(
-        sweeps=config.refinement_sweeps, minutes=config.refinement_minutes, seed=abs(config.run.seed) % (1 << 31)
+        sweeps=config.refinement_sweeps,
+        minutes=config.refinement_minutes,
+        albedo_size=config.refinement.albedo_size,
+        seed=abs(config.run.seed) % (1 << 31),
     )
     try:
         with same_bits(config.run.deterministic):

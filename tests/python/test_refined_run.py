@@ -215,7 +215,7 @@ def folder(painted, tmp_path) -> Path:
     return tmp_path
 
 
-QUICK = FitSettings(sweeps=4, sweep_share=0.1, pixels=256)
+QUICK = FitSettings(sweeps=4, sweep_share=0.1, pixels=256, albedo_size=0)
 
 
 def n_pixels(painted) -> int:

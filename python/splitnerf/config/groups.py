@@ -236,6 +236,12 @@ class RefinementSettings:
         0.2, "share of run.max_minutes for the refinement; training gets the rest", unit=OF_RUN, below=1.0
     )
     sweeps: int = setting(16, "Gauss-Newton steps of the refinement where no minutes end it", unit="steps", at_least=1)
+    albedo_size: int = setting(
+        4096,
+        "most texels along the edge of the albedo's texture, which gets the photos' detail; 0: it does not",
+        unit="texels",
+        at_most=8192,
+    )
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,7 @@ class FitSettings:
         light_step: Share of the light's first Gauss-Newton step that is taken, less of the later ones; 0 keeps the
             light.
         outline: Whether vertices move first, so that the asset covers the pixels as the masks do.
+        albedo_size: The most texels along the edge of the albedo's texture, which in the end gets the photos' detail; 0: it does not.
         seed: Seed of all random numbers.
     """
 
@@ -90,6 +91,7 @@ class FitSettings:
     directions: int = 12
     light_step: float = 0.5
     outline: bool = True
+    albedo_size: int = 4096
     seed: int = 0
 
 

@@ -62,7 +62,7 @@ def read_light(folder: Path) -> np.ndarray:
 def occlusion_texture(asset: Asset) -> np.ndarray:
     """[h, w] the open share of each texel's hemisphere, for viewers that trace no rays."""
     extent = float(np.ptp(asset.vertices, axis=0).max())
-    return bake_occlusion(asset, asset.materials[0].albedo_texture.shape[0], OCCLUSION_OFFSET * extent)
+    return bake_occlusion(asset, asset.materials[0].roughness_metallic_texture.shape[0], OCCLUSION_OFFSET * extent)
 
 
 def source_of(run: Path) -> Path:
@@ -174,7 +174,9 @@ def refine_folder(
         kept.save()  # also where all is done: what follows may be interrupted, too
         if not complete or not stage.finished:
             return None
-    refined = stage.result()
+    with Progress(0.0, leave=False) as bar:
+        stage.show = bar.show
+        refined = stage.result()
     write_glb(out / "mesh.glb", refined.asset, occlusion_texture(refined.asset))
     write_environment(out, refined.light)
     write_json(out / RECORD, record_of(refined, stage.seconds))
@@ -186,7 +188,7 @@ def read_source(source: Path) -> tuple[Asset, np.ndarray]:
     path = source / "mesh.glb"
     if not path.is_file():
         raise InputError(f"{path}: no such asset; finish the run, or write it with `splitnerf export {source}`")
-    asset, light = with_normal_texture(read_asset(path)), read_light(source)
+    asset, light = with_normal_texture(without_detail(read_asset(path))), read_light(source)
     try:
         check_form(asset)
     except ValueError as error:
@@ -194,12 +196,22 @@ def read_source(source: Path) -> tuple[Asset, np.ndarray]:
     return asset, light
 
 
+def without_detail(asset: Asset) -> Asset:
+    """The asset with its albedo averaged down to the size of its other textures, if a refinement has made it finer."""
+    material = asset.materials[0]
+    fine, coarse = material.albedo_texture, material.roughness_metallic_texture
+    if fine is None or coarse is None or len(fine) <= len(coarse) or len(fine) % len(coarse):
+        return asset
+    albedo = area_average(fine, len(fine) // len(coarse)).astype(np.float32)
+    return dataclasses.replace(asset, materials=[dataclasses.replace(material, albedo_texture=albedo)])
+
+
 def with_normal_texture(asset: Asset) -> Asset:
     """The asset with the mesh's own normals as its normal texture, if a refinement has left it out."""
     material = asset.materials[0]
-    if material.normal_texture is not None or material.albedo_texture is None or asset.uv is None:
+    if material.normal_texture is not None or material.roughness_metallic_texture is None or asset.uv is None:
         return asset
-    straight = np.tile(np.float32([0, 0, 1]), (*material.albedo_texture.shape[:2], 1))
+    straight = np.tile(np.float32([0, 0, 1]), (*material.roughness_metallic_texture.shape[:2], 1))
     tangents = vertex_tangents(asset.vertices, asset.triangles, asset.normals, asset.uv)
     return dataclasses.replace(
         asset, tangents=tangents, materials=[dataclasses.replace(material, normal_texture=straight)]
@@ -236,6 +248,7 @@ def record_of(refined: Refined, seconds: float) -> dict:
         "held_out": list(refined.held),
         "delivered": refined.delivered,
         "normal_texture": refined.asset.materials[0].normal_texture is not None,
+        "albedo_size": refined.asset.materials[0].albedo_texture.shape[0],
         "sweeps": [sweep._asdict() for sweep in refined.sweeps],
     }
 

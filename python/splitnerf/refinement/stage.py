@@ -1,4 +1,5 @@
-"""A refinement, sweep by sweep: the outline, a compact lamp, the fit; with a state from which another process can continue."""
+"""A refinement, sweep by sweep: the outline, a compact lamp, the fit, the detail; with a state from which another process can
+continue."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ import torch
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
+from splitnerf.refinement.detail import detail_size, with_detail
 from splitnerf.refinement.fit import FitSettings, Refinement, is_worse
 from splitnerf.refinement.lamps import CompactLamp
 from splitnerf.refinement.light import radiance_of
@@ -25,7 +27,8 @@ from splitnerf.refinement.unknowns import to_values
 BIASED = 1.05  # factor on the error of held-out pixels at the start, which training has fitted, as the trained asset has them
 PATIENCE = 6  # sweeps after the best one, after which the fit ends
 LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
-OUTLINE_SHARE = 0.5  # of the minutes, after which no further round of the outline begins, nor the search for a lamp
+DETAIL_SHARE = 0.25  # of the minutes, kept for the detail where the photos show more than the textures hold
+OUTLINE_SHARE = 0.5  # of the rest, after which no further round of the outline begins, nor the search for a lamp
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,9 @@ class Stage:
     ends. The texels and the light after the last sweep are delivered, unless that one, or the start, is clearly better;
     without the normal texture, unless these photos are explained clearly worse without it.
 
-    The minutes limit it: after OUTLINE_SHARE of them no further round of the outline begins, except the first, and no
+    Where the photos' pixels are about as fine as the texels or finer, the albedo gets their detail at the end.
+
+    The minutes limit it: after OUTLINE_SHARE of those that the detail leaves no further round of the outline begins, except the first, and no
     lamp is searched for. A sweep takes at most a LEAST_SWEEPS-th of them, the last one the rest. One sweep is always
     made.
 
@@ -129,7 +134,8 @@ class Stage:
         show: Callable[[float, str], None] = lambda share, message: None,
     ):
         check_form(asset)
-        self.settings, self.show, self.outline, self.sweeps = settings, show, [], []
+        self.dataset, self.settings, self.show, self.outline, self.sweeps = dataset, settings, show, [], []
+        self.albedo_size = detail_size(dataset, asset, settings.albedo_size)
         self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
         self.best: Candidate | None = None
         self.held_seconds = 0.0  # that the last look at held-out pixels took
@@ -181,7 +187,12 @@ class Stage:
 
     @property
     def limit(self) -> float:
-        """The time limit in seconds."""
+        """The time limit of outline, lamp and sweeps in seconds."""
+        return self.minutes_limit * (1.0 if self.albedo_size is None else 1.0 - DETAIL_SHARE)
+
+    @property
+    def minutes_limit(self) -> float:
+        """The time limit of all in seconds."""
         return 60.0 * self.settings.minutes if self.settings.minutes > 0 else math.inf
 
     @property
@@ -259,6 +270,11 @@ class Stage:
         if not self.normals_show(chosen):
             asset = replace(asset, materials=[replace(asset.materials[0], normal_texture=None)])
         light = radiance_of(chosen.light).numpy()
+        if self.albedo_size is not None:
+            left = max(self.minutes_limit - self.seconds, DETAIL_SHARE * self.minutes_limit)
+            asset = with_detail(
+                self.dataset, asset, light, self.albedo_size, left, lambda share: self.show(share, "refinement, detail")
+            )
         held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else BIASED))
         saturated = float(fit.pixels.saturated.mean())
         return Refined(asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level)
