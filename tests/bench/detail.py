@@ -25,7 +25,7 @@ from splitnerf.data.truth import load_view_truths
 from splitnerf.ops import MeshScene
 from splitnerf.refinement.detail import FineTexels, detail_size, read_texture, with_detail
 from splitnerf.refinement.pixels import MIN_ALPHA, Pixels
-from splitnerf.refinement.refine import read_light, read_source, source_of
+from splitnerf.refinement.refine import read_source, source_of
 from splitnerf_tools.bench.provenance import header, provenance
 
 FINE = 8  # pixels, sigma of a Gaussian
@@ -118,7 +118,7 @@ def main() -> None:
     facts = provenance(("python/splitnerf/refinement",), "python tests/bench/detail.py RUN DATA ...")
     lines, pictures = zip(*(rows_of(*pair, args.averages) for pair in zip(args.runs[::2], args.runs[1::2])))
     image = Image.fromarray((255 * np.concatenate(pictures)).round().astype(np.uint8))
-    image.reduce(2).save(args.out / "detail.jpg", quality=85)
+    image.save(args.out / "detail.jpg", quality=85)
     columns = "| object | albedo | photos | texels along an edge | albedo, dB | fine structure, dB | seconds |"
     shown = "![Training alone, projection, detail, truth](detail.jpg)"
     table = [columns, "|" + " --- |" * 7, *sum(lines, [])]
