@@ -89,7 +89,7 @@ def ruined_after(monkeypatch, n: int) -> None:
 def begun(painted, sweeps: int) -> Stage:
     """A stage that begins with a wrong albedo."""
     asset, data = painted
-    stage = Stage(data, asset, sky(), FitSettings(sweeps, pixels=128, directions=4, outline=False, light_step=0.0, albedo_size=0))
+    stage = Stage(data, asset, sky(), replace(SETTINGS, sweeps=sweeps, light_step=0.0, albedo_size=0))
     stage.fit.wrong = torch.zeros_like(stage.fit.unknowns)
     stage.fit.wrong[:, :3] = 0.1
     stage.fit.unknowns = stage.fit.unknowns + stage.fit.wrong
