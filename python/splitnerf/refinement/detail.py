@@ -17,6 +17,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -38,21 +39,17 @@ from splitnerf.refinement.texels import bilinear_footprints, charts
 
 # Widths of a texel in the photos' pixels: up to which a texture is fine enough, and below which photos tell less than the fit.
 FINE_ENOUGH, LEAST_WIDTH = 1.5, 0.75
-WINDOW = 4  # texels of the fit along the edge of a window
+WINDOW = 4  # half the texels of the fit along the edge of a window
 GRAZING = 0.15  # cosine of a line of sight and the normal below which a photo says nothing of a texel
 LEAST_SHARE = 0.15  # f is never below it
 MOST_CONTRAST = 4.0  # c / c' is never above it
 DARK = 1e-4  # linear colours and albedos below it count as this
-PATCH, DIRECTIONS = (
-    4,
-    48,
-)  # texels of the fit along the edge of a patch whose scattered light is found, by so many directions
+PATCH = 4  # texels of the fit along the edge of a patch whose scattered light is found
+DIRECTIONS = 48  # by which it is
 MAX_BOUNCES, CLAMP_INDIRECT = 2, 10.0
 OFFSET = 1e-3  # of a line of sight from the surface, as a share of the asset's extent
 MOST_TURNS = 8  # rotations over which a turning light is averaged
-CONFIRMED = (
-    0.25  # part of what was added that photos held out must show: of a window that they show less of, less is kept
-)
+CONFIRMED = 0.25  # part of what was added that photos held out must show; where they show less, less is kept
 FITTED = 0.8  # share of the time for the photos that are not held out
 
 
@@ -122,12 +119,12 @@ class FineTexels:
     Attributes:
         albedo, metallic: [m, 3] and [m, 1] of the fit.
         scattered: [m, 3] the linear radiance that a diffuse surface of that albedo scatters.
-        windows: Of WINDOW texels of the fit.
+        windows: Of twice WINDOW texels of the fit.
     """
 
     def __init__(self, asset: Asset, light: Tensor, size: int):
         m, covered = asset.materials[0], rasterise(asset.uv, asset.triangles, size)
-        of_texels = lambda values: covered.interpolate(values, asset.triangles)  # noqa: E731
+        of_texels = partial(covered.interpolate, faces=asset.triangles)
         corners, uv = asset.vertices[asset.triangles], of_texels(asset.uv)
         faces = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         self.positions, self.normals = (
@@ -190,13 +187,15 @@ def scattered_light(asset: Asset, scene: MeshScene, light: Tensor, size: int) ->
     surface = TexturedSurface(
         scene, *(torch.from_numpy(x) for x in (asset.normals, asset.tangents, asset.uv.astype(np.float32), *maps))
     )
-    of_texels = lambda values: torch.from_numpy(covered.interpolate(values, asset.triangles))  # noqa: E731
-    normals = F.normalize(of_texels(asset.normals), dim=1)
+    positions, normals = (
+        torch.from_numpy(covered.interpolate(x, asset.triangles)) for x in (asset.vertices, asset.normals)
+    )
+    normals = F.normalize(normals, dim=1)
     ones = torch.ones(len(normals), 1)
     arriving = incoming_light(
         surface,
         light,
-        of_texels(asset.vertices),
+        positions,
         geometric_normals=normals,
         normals=normals,
         view_dirs=normals,
@@ -216,14 +215,14 @@ def scattered_light(asset: Asset, scene: MeshScene, light: Tensor, size: int) ->
 
 def detail_size(dataset: Dataset, asset: Asset, most: int) -> int | None:
     """The edge of the texture that photos fill with detail: the present one, times a power of 2 if they need it and at most
-    `most`; None where photos are too coarse, or `most` is 0."""
+    `most`; None where photos are too coarse, or too few to hold one out, or `most` is 0."""
     size, corners = asset.materials[0].albedo_texture.shape[0], asset.vertices[asset.triangles].astype(np.float64)
     surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     flat = asset.uv[asset.triangles].astype(np.float64)
     (ux, uy), (vx, vy) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
     texel = math.sqrt(surface / max(np.abs(ux * vy - uy * vx).sum(), 1e-12)) / size
     width = texel / pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
-    if most == 0 or width < LEAST_WIDTH:
+    if most == 0 or width < LEAST_WIDTH or len(dataset) <= HELD_OUT // 2:
         return None
     while width > FINE_ENOUGH and 2 * size <= most:
         size, width = 2 * size, width / 2
@@ -250,7 +249,7 @@ def with_detail(
     """The asset with an albedo texture as fine as the photos.
 
     Args:
-        dataset: The photos; fewer than HELD_OUT / 2 + 1 of them change nothing.
+        dataset: The photos, more than HELD_OUT / 2.
         asset: An asset with one material, textured with albedo, roughness-metallic and normals.
         light: [h, 2 h, 3] linear radiance.
         size: The edge of the new texture, the present one or a multiple of it.
@@ -260,8 +259,6 @@ def with_detail(
     n, started = len(dataset), time.monotonic()
     order = np.argsort(np.arange(n) * 0.6180339887 % 1)  # any first part is spread over all
     held = order[HELD_OUT // 2 :: HELD_OUT]
-    if len(held) == 0:
-        return asset
     texels = FineTexels(asset, mean_light(light, dataset.light_turns), size)
     sums, weights = torch.zeros_like(texels.albedo), torch.zeros(len(texels.albedo), 1)
     for count, view in enumerate(np.setdiff1d(order, held, assume_unique=True)):
