@@ -336,8 +336,8 @@ def export_run(
             that is not installed.
         EmptyMesh: The surface is empty.
     """
-    if is_refined(run) and out.resolve() == run.resolve():
-        raise InputError(f"{run}: delivers what its refinement fitted, which this would replace; give another --out")
+    if (is_refined(run) and out.resolve() == run.resolve()) or (out / RECORD).is_file():
+        raise InputError(f"{out}: holds what a refinement fitted, which this would replace; give another --out")
     refuse_no_run(run)
     check_results(out, run, overwrite=overwrite)
     own = own_results(out, run)

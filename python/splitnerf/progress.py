@@ -117,13 +117,6 @@ class Progress:
                 f"{100 * progress:3.0f}% {tqdm.format_interval(elapsed)}<{left} {text}", file=self._stream, flush=True
             )
 
-    @contextmanager
-    def aside(self) -> Iterator[None]:
-        """Hides the bar of a terminal within the block, so that other lines can be written."""
-        self._bar.clear()
-        yield
-        self._bar.refresh()
-
     def skip(self, seconds: float) -> None:
         """Excludes the last seconds, in which nothing was done."""
         self._started += seconds

@@ -104,11 +104,10 @@ def is_run(run: Path) -> bool:
 
 def clear_run(run: Path) -> None:
     """Deletes the files of a run, and nothing else."""
+    previews = list((run / "previews").glob("step_*.png")) if is_run(run) else []
     discard_refinement(run)
-    for name in RUN_FILES:
-        (run / name).unlink(missing_ok=True)
-    for preview in (run / "previews").glob("step_*.png"):
-        preview.unlink()
+    for path in [*previews, *(run / name for name in RUN_FILES)]:
+        path.unlink(missing_ok=True)
 
 
 def begin_or_resume(run: Path) -> tuple[bool, bool]:

@@ -6,6 +6,7 @@
     scenes    objects with full truth, 30 minutes each
     kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
     time      error against time: half a minute to 30 minutes, two objects, two seeds
+    paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
 Each run becomes rows of PAGE.csv as soon as it ends; the command goes on where it was interrupted. Rows of other minutes or
@@ -28,6 +29,7 @@ from PIL import Image
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import read_json
 from splitnerf.files import atomic_path
+from splitnerf.refinement.refine import source_of
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
 from splitnerf_tools.demo.scene import build_environment
@@ -50,7 +52,14 @@ SCORES = {  # column: the evaluation's keys, digits
     "light, dB": (("light_psnr",), 1),
     "F-score": (("f_score",), 3),
 }
-KEYS = ("scene", "minutes", "seed", "images", "threads", "asset")
+SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
+    "cpu": (),
+    "paper": (
+        *("--preset", "paper", "--steps", 20000, "--set", "target_samples=4096", "--set", "light_samples=2048"),
+        *("--set", "light_queries=2048", "--set", "mesh.resolution=192"),
+    ),
+}
+KEYS = ("scene", "settings", "minutes", "seed", "images", "threads", "asset")
 COLUMNS = (*KEYS, *SCORES, "seconds", "commit", "date")
 HARD = {  # the light of the photos; three others relight it
     "knot": "lebombo_1k.hdr",
@@ -68,11 +77,11 @@ Row = dict[str, str]
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, what it holds, and its runs."""
+    """A page: its title, what it holds, and its runs: settings and minutes, 0 for as long as the steps take."""
 
     title: str
     scenes: tuple[str, ...]
-    minutes: tuple[float, ...]
+    runs: tuple[tuple[str, float], ...]
     size: int
     seeds: int = 1
     pictures: bool = False
@@ -80,11 +89,18 @@ class Page:
 
 PAGES = {
     "shapes": Page(
-        "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (4,), 120
+        "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (("cpu", 4),), 120
     ),
-    "scenes": Page("Objects", ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket"), (30,), 200),
-    "kinds": Page("Unseen kinds", tuple(KINDS), (8,), 100, pictures=True),
-    "time": Page("Error against time", ("boombox", "knot"), (0.5, 1, 2, 4, 8, 15, 30), 200, 2),
+    "scenes": Page(
+        "Objects", ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket"), (("cpu", 30),), 200
+    ),
+    "kinds": Page("Unseen kinds", tuple(KINDS), (("cpu", 8),), 100, pictures=True),
+    "time": Page(
+        "Error against time", ("boombox", "knot"), tuple(("cpu", m) for m in (0.5, 1, 2, 4, 8, 15, 30)), 200, 2
+    ),
+    "paper": Page(
+        "The published method, 1/64 of the samples, all steps", ("boombox",), (("cpu", 30), ("paper", 0)), 200
+    ),
 }
 
 
@@ -121,21 +137,32 @@ def data_of(scene: str, size: int, work: Path) -> Path | None:
     return data if splitnerf("synth", *words, "--out", data, *counts) else None
 
 
-def rows_of(scene: str, minutes: float, seed: int, page: Page, work: Path) -> list[Row]:
+def rows_of(scene: str, settings: str, minutes: float, seed: int, page: Page, work: Path) -> list[Row]:
     """Trains on a scene and scores the run; no rows where that failed or the data are not there."""
     if (data := data_of(scene, page.size, work)) is None:
         print(f"{scene}: no data, left out", file=sys.stderr)
         return []
-    run = work / f"runs/{scene.replace(' ', '_')}_{minutes:g}_{seed}"
+    run = work / f"runs/{scene.replace(' ', '_')}_{settings}_{minutes:g}_{seed}"
     commit = provenance(SOURCES)["commit"]  # before, as the sources may change meanwhile
-    if not splitnerf("train", data, "--out", run, "--max-minutes", minutes, "--seed", seed, "--overwrite"):
+    words = *SETTINGS[settings], "--max-minutes", minutes, "--seed", seed, "--overwrite"
+    if not splitnerf("train", data, "--out", run, *words):
         return []
-    rows = []
-    for asset, file in (("trained", run / "trained/mesh.glb"), ("refined", run)):
+    rows, files = [], {"trained": source_of(run) / "mesh.glb", "refined": run}
+    if source_of(run) == run:
+        del files["refined"]
+    for asset, file in files.items():
         scores = run / f"{asset}.json"
         if not splitnerf("evaluate", file, "--data", data, "--spp", 64, "--views", 6, "--out", scores):
             return []
-        key = scene, f"{minutes:g}", str(seed), f"{page.size}", os.environ.get("OMP_NUM_THREADS", "all"), asset
+        key = (
+            scene,
+            settings,
+            f"{minutes:g}",
+            str(seed),
+            f"{page.size}",
+            os.environ.get("OMP_NUM_THREADS", "all"),
+            asset,
+        )
         rows.append(dict(zip(KEYS, key)) | scored(read_json(scores, "novel_view"), commit))
     if page.pictures:
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
@@ -165,7 +192,8 @@ def read_rows(path: Path) -> list[Row]:
     if not path.is_file():
         return []
     with open(path, newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        rows = csv.DictReader(line for line in file if not line.startswith("#"))
+        return [{"settings": "cpu"} | row for row in rows]
 
 
 def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
@@ -174,7 +202,7 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     facts = provenance(SOURCES, f"make results PAGE={name}") | {"commit": oldest["commit"], "date": oldest["date"][:10]}
     del facts["threads"]
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
-    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in KEYS[:2]]
+    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in ("scene", "minutes")]
     lines = [f"# {page.title}", "", header(facts), ""]
     if name == "time":
         draw(out / f"{name}.png", rows)
@@ -254,18 +282,18 @@ def main() -> int:
         page, rows = PAGES[name], read_rows(args.out / f"{name}.csv")
         for seed in range(page.seeds):
             for scene in args.only or page.scenes:
-                for minutes in args.minutes or page.minutes:
-                    key = scene, f"{minutes:g}", str(seed)
-                    if not args.again and any(tuple(row[k] for k in KEYS[:3]) == key for row in rows):
+                for settings, minutes in [("cpu", m) for m in args.minutes or ()] or page.runs:
+                    key = scene, settings, f"{minutes:g}", str(seed)
+                    if not args.again and any(tuple(row[k] for k in KEYS[:4]) == key for row in rows):
                         continue
                     total += minutes
                     if args.list:
-                        print(f"{name}: {scene}, {minutes:g} minutes, seed {seed}")
+                        print(f"{name}: {scene}, {settings}, {minutes:g} minutes, seed {seed}")
                         continue
-                    found = rows_of(scene, minutes, seed, page, args.work)
+                    found = rows_of(scene, settings, minutes, seed, page, args.work)
                     failed |= not found
                     if found:
-                        rows = [row for row in rows if tuple(row[k] for k in KEYS[:3]) != key] + found
+                        rows = [row for row in rows if tuple(row[k] for k in KEYS[:4]) != key] + found
                         order = {s: i for i, s in enumerate(page.scenes)}
                         rows.sort(
                             key=lambda r: (

@@ -3,9 +3,11 @@
 import fcntl
 import io
 import json
+import sqlite3
 import subprocess
 import sys
 import threading
+from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -35,7 +37,7 @@ from splitnerf_tools.capture.photographs import (
     write_png,
 )
 from splitnerf_tools.capture.photometry import find_exposures
-from splitnerf_tools.capture.poses import Lens, Reconstruction, _counted
+from splitnerf_tools.capture.poses import Lens, Reconstruction, _counted, _is_sound
 from splitnerf_tools.capture.prepare import PrepareSettings, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -204,6 +206,30 @@ def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
     (tmp_path / "p_03.MP.png").unlink()
     with pytest.raises(InputError, match="has no mask p_03.MP.png"):
         mask_files(photos, tmp_path)
+
+
+def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
+    """Two photos that differ in their suffixes; two masks that do."""
+    photos = [Photograph(tmp_path / f"a{suffix}", f"a{suffix}", 8, 6, None, "", None) for suffix in (".jpg", ".png")]
+    Image.new("L", (8, 6)).save(tmp_path / "a.png")
+    with pytest.raises(InputError, match=r"a.png: may be the mask of a.jpg or of a.png; call it a.png.png"):
+        mask_files(photos, tmp_path)
+    Image.new("L", (8, 6)).save(tmp_path / "a.png.png")
+    assert [path.name for path in mask_files(photos, tmp_path).values()] == ["a.png", "a.png.png"]
+    Image.new("L", (8, 6)).save(tmp_path / "a.bmp")
+    with pytest.raises(InputError, match="a.png: may be a mask of the same photo as a.bmp; delete one of them"):
+        mask_files(photos[:1], tmp_path)
+
+
+@pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])
+def test_a_damaged_database_of_features_is_known(tmp_path, damage):
+    path = tmp_path / "features.db"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("CREATE TABLE keypoints (a)")
+        base.commit()
+    assert _is_sound(path)
+    path.write_bytes(damage)
+    assert _is_sound(path) == (damage == b"")  # an empty file is an empty database
 
 
 def test_sigterm_ends_it_without_a_stack_trace(tmp_path):

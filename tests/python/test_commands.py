@@ -44,21 +44,11 @@ def test_help_keeps_examples_and_wraps_the_rest(name, monkeypatch):
     assert len(said) <= 66 and all(len(line) <= 80 for line in said if line not in examples)
 
 
-def test_names_of_other_programs_are_understood():
-    """Those of nerfstudio and instant-ngp; the help lists ours alone."""
-    theirs = "train D --downscale-factor 3 --max-num-iterations 70 --output-dir R --eval-mode all"
-    ours = "train D --downscale 3 --steps 70 --out R --eval-mode all"
-    parsed = [build_parser().parse_args(text.split()) for text in (theirs, ours, "train D --n_steps 70 --out R")]
-    assert parsed[0] == parsed[1] and parsed[2].steps == 70 and parsed[2].downscale == 1
-    assert "--downscale-factor" not in PARSERS["train"].format_help()
-
-
 @pytest.mark.parametrize("shell", SHELLS)
 def test_a_completion_knows_all_commands_and_their_options(shell, capsys):
     text = script(shell, capsys)
     assert all(name in text for name in PARSERS)
     assert "--max-minutes" in text or "max-minutes" in text
-    assert "--n_steps" not in text
 
 
 def completed(text: str, *words: str) -> list[str]:

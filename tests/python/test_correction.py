@@ -41,7 +41,7 @@ def points_at(roughness: torch.Tensor, split: float) -> tuple:
     one = torch.ones(n, 1)
     albedo = torch.full((n, 3), 0.5)
     return views, ShadedPoints(
-        torch.full((n, 3), split), normals, albedo, roughness, 0 * one, one, one, normals, views, 0.5 * normals
+        torch.full((n, 3), split), normals, albedo, roughness, 0 * one, one, one, normals, 0.5 * normals
     )
 
 
@@ -73,7 +73,7 @@ def test_the_sum_holds_what_the_mesh_sends():
     x, n = bits.cache.vertices[::5], bits.cache.normals[::5]
     inner = x[:, 2] < -0.1
     one = torch.ones(len(x), 1)
-    points = ShadedPoints(torch.zeros(len(x), 3), n, torch.ones(len(x), 3), one, 0 * one, one, one, n, n, x)
+    points = ShadedPoints(torch.zeros(len(x), 3), n, torch.ones(len(x), 3), one, 0 * one, one, one, n, x)
     light, found = model.evaluate_light(), []
     for sent in (torch.ones_like(bits.radiance), None):
         bits.radiance = sent

@@ -7,7 +7,6 @@ import torch
 import trimesh
 from mesh_shapes import traced
 from op_checks import generator, unit
-from splitnerf import _core
 from splitnerf.fields import MaterialHead, Occlusion, OcclusionHead
 from splitnerf.fields.surface import relu_mlp
 from splitnerf.render.model import SceneModel
@@ -69,22 +68,13 @@ def test_a_roughness_at_the_end_of_its_range_can_be_learned(initial, least, expe
 # ---- occlusion ----
 
 
-def points_of(n: int = 40, n_inputs: int = 7) -> list[torch.Tensor]:
-    """Inputs of the head, axes and roughness of lobes; each may have a gradient."""
-    g = generator(3)
-    lobes = unit(torch.randn(n, 3, generator=g))
-    parts = torch.randn(n, n_inputs, generator=g), lobes, torch.rand(n, 1, generator=g)
-    return [part.requires_grad_() for part in parts]
-
-
 def factors_of(head: OcclusionHead) -> Occlusion:
-    inputs, *lobes = points_of()
-    return head([inputs], *lobes)
+    return head([torch.randn(40, 7, generator=generator(3))])
 
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_the_factors_are_their_own_outputs_and_mostly_open_at_first(channels):
-    head = OcclusionHead(7, 8, 1, channels, directional=False)
+    head = OcclusionHead(7, 8, 1, channels)
     with torch.no_grad():
         head.net[-1].weight.zero_()
     found = factors_of(head)
@@ -115,31 +105,3 @@ def test_all_is_open_before_the_first_mesh_without_occlusion_and_where_nothing_i
         for factor in model.occlusion_at(inputs, *points)[:2]:
             assert torch.equal(factor, ones) != (has_mesh and kind == "mlp") and factor.shape == ones.shape
     assert model.is_unoccluded == (kind == "bits")
-
-
-def test_the_gradient_goes_into_what_the_head_reads_of_the_field_and_not_into_the_geometry():
-    head, (inputs, lobes, roughness) = OcclusionHead(7, 8, 1, 1, directional=True), points_of()
-    found = head([inputs], lobes, roughness)
-    (found.diffuse.sum() + found.specular.sum()).backward()
-    assert inputs.grad.abs().sum() > 0 and head.net[0].weight.grad.abs().sum() > 0
-    assert lobes.grad is roughness.grad is None
-
-
-def test_a_directional_head_reads_the_lobe_by_functions_that_differ_over_the_sphere():
-    """Its axis, the five harmonics of degree 2, without a mean or anything in common, the cube of z, and its width."""
-    directions = torch.from_numpy(_core.fibonacci_sphere(4096)).float()
-    head = OcclusionHead(7, 8, 1, 1, directional=True)
-    read = []
-    head.net = torch.nn.Sequential(torch.nn.Identity())
-    head.net.register_forward_hook(lambda _, inputs, __: read.append(inputs[0]))
-    n = len(directions)
-    inputs, roughness = torch.rand(n, 7), torch.rand(n, 1, generator=generator())
-    head([inputs], directions, roughness)
-    (read,) = read
-    assert read.shape == (n, 17) and torch.equal(read[:, :7], inputs)
-    assert torch.equal(read[:, 7:10], directions) and torch.equal(read[:, 16:], roughness)
-    torch.testing.assert_close(read[:, 15], directions[:, 2] ** 3)
-    harmonics = read[:, 10:15].double()
-    assert harmonics.mean(0).abs().max() < 1e-3
-    products = harmonics.T @ harmonics / n
-    assert products.diag().min() > 0.05 and (products - products.diag().diag()).abs().max() < 1e-3

@@ -287,6 +287,16 @@ def test_the_frame_that_contradicts_the_others_is_named(tmp_path, alpha):
         load_dataset(root)
 
 
+def test_the_unit_of_the_data_does_not_matter(tmp_path):
+    found = []
+    for unit in (1e-9, 1e4):
+        root, units = write_transforms(tmp_path / f"{unit}"), np.array([[1.0, 1, 1, unit]] * 3 + [[1, 1, 1, 1]])
+        for i in range(COUNT):
+            edit(root, set_pose(i, lambda pose: (pose * units).tolist()), "transforms.json")
+        found.append(load_dataset(root).poses)
+    np.testing.assert_allclose(*found, atol=1e-4)
+
+
 def test_an_origin_far_away_is_brought_near(tmp_path):
     """Coordinates of a land survey: float32 keeps half a metre of them."""
     survey = np.array([447_012.5, 5_411_003.0, 212.0])

@@ -54,12 +54,34 @@ def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
     assert load_dataset(tmp_path).intrinsics[0, 0] == pytest.approx(2 * FOCAL)
 
 
+def test_the_axes_of_a_frames_own_lens_are_independent(tmp_path):
+    write_transforms(tmp_path, fl_y=3 * FOCAL)
+    path = tmp_path / "transforms.json"
+    content = json.loads(path.read_text())
+    content["frames"][1]["fl_x"] = 2 * FOCAL
+    path.write_text(json.dumps(content))
+    found = {frame.name: frame.lens for frame in read_frames(tmp_path, "train")[0]}
+    changed = [lens for lens in found.values() if lens.get("fl_x") == 2 * FOCAL]
+    assert len(changed) == 1 and all(lens["fl_y"] == 3 * FOCAL for lens in found.values())
+
+
 def test_masks_of_colmap_are_found_by_both_names(tmp_path):
     root = write_colmap(tmp_path, binary=True, masks=True)
     for i in range(0, COUNT, 2):
         (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/v{i:02d}.png")
     frames, _ = read_frames(root, "train")
     assert all(frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.name) for frame in frames)
+
+
+def test_masks_of_colmap_are_found_by_other_forms_of_their_names(tmp_path):
+    """A letter with an accent, composed in the model and decomposed in the file system."""
+    root = write_colmap(tmp_path, binary=False, masks=True)
+    (model,) = root.rglob("images.txt")
+    model.write_text(model.read_text().replace("v00.png", "\u00e9.png"))
+    (root / "images/v00.png").rename(root / "images/e\u0301.png")
+    (root / "masks/v00.png.png").rename(root / "masks/e\u0301.png.png")
+    frames, _ = read_frames(root, "train")
+    assert all(frame.mask_path.is_file() for frame in frames)
 
 
 @pytest.mark.parametrize("binary", [True, False])

@@ -1,4 +1,4 @@
-"""The parts that lights share: how many directions, gradients that gather, other tensors in their place, panoramas."""
+"""The parts that lights share: gradients that gather, other tensors in their place, panoramas."""
 
 import math
 
@@ -9,40 +9,8 @@ from op_checks import generator, unit
 from precision import precisions
 from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, SkyCells
 from splitnerf.fields import light as lights
-from splitnerf.fields.light import (
-    LightSamples,
-    chain_resolution,
-    is_resolved,
-    lobe_roughness,
-    panorama_directions,
-    pyramid_filters,
-)
+from splitnerf.fields.light import chain_resolution, is_resolved, lobe_roughness, panorama_directions, pyramid_filters
 from splitnerf.ops import sh_projection
-
-# ---- the number of directions ----
-
-
-def learned(*steps: tuple[float, float, int]) -> LightSamples:
-    samples = LightSamples()
-    for step in steps:
-        samples.learn(*step)
-    return samples
-
-
-def test_the_number_of_directions_has_bounds():
-    assert learned().count(0.1, 1000) == 1000
-    assert learned((0.1, 1.0, 200)).count(0.1, 1000) == 200
-    assert learned((0.1, 1.0, 200)).count(0.05, 1000) == 400
-    assert learned((0.1, 1.0, 200)).count(0.1, 150) == 150
-    assert learned((0.01, 1.0, 200)).count(0.1, 1000) == 64 and learned((0.01, 1.0, 200)).count(0.1, 50) == 50
-
-
-def test_noise_and_error_are_means_of_the_last_steps():
-    """A step counts for 3 in 100: 20 and then 50 make 20.9 of variance, 1 and then 5 make 1.12 of error."""
-    samples = learned((0.1, 1.0, 200), (0.5, 5.0, 100))
-    assert samples.state().tolist() == pytest.approx([20.9, 1.12], rel=1e-12)
-    assert samples.state().dtype == torch.float64
-
 
 # ---- evaluated lights ----
 

@@ -76,14 +76,14 @@ def test_a_damaged_state_is_refused(tmp_path, text):
 
 def test_options_reach_each_training_as_they_were_given():
     given = (
-        "--preset paper --n_steps 70 --max-minutes 1.5 --device cpu --seed 3 --deterministic --no-refine --downscale 2 \
+        "--preset paper --steps 70 --max-minutes 1.5 --device cpu --seed 3 --deterministic --no-refine --downscale 2 \
         --eval-mode all --mask-kind ignore --max-memory 2.5 --set a=-1 --set b=[1,2]".split()
     )
     parsed = build_parser().parse_args(["batch", "S", "--out", "D", *given])
     words = given_options(parsed)
     trained = vars(build_parser().parse_args(["train", "S", *words]))
     told = vars(build_parser().parse_args(["train", "S", *given]))
-    assert trained == told and "--seed=3" in words and not any(word.startswith("--n_steps") for word in words)
+    assert trained == told and "--seed=3" in words
     assert given_options(build_parser().parse_args(["batch", "S", "--out", "D"])) == []
 
 
@@ -92,7 +92,7 @@ def test_every_option_of_train_is_one_of_batch_but_where_to_write():
         name: {o for a in build_parser()._subparsers._group_actions[0].choices[name]._actions for o in a.option_strings}
         for name in ("train", "batch")
     }
-    alone = "--output-dir --resume --overwrite --downscale-factor --view --tensorboard"
+    alone = "--resume --overwrite --view --tensorboard"
     assert options["train"] - options["batch"] == set(alone.split())
 
 

@@ -110,6 +110,25 @@ def test_results_do_not_replace_others(done, mine, tmp_path, capsys, name, words
     assert contents(other) | contents(mine) == before
 
 
+def test_what_a_refinement_fitted_or_begins_with_is_not_replaced(done, mine, capsys):
+    (done / "refined").mkdir()
+    (done / "refined/refinement.json").write_text("{}")
+    for name in ("mesh.glb", "environment.exr"):
+        shutil.copy(done / name, mine)
+    before = contents(mine) | contents(done)
+    refused(capsys, "refined: holds what a refinement fitted", "export", done, "--out", done / "refined")
+    refused(capsys, "mine: holds the asset to refine", "refine", mine, "--data", "data", "--out", mine, "--overwrite")
+    refused(capsys, "mine/mesh.glb: would be replaced", "refine", done, "--data", "data", "--out", mine, "--resume")
+    assert contents(mine) | contents(done) == before
+
+
+def test_previews_of_no_run_stay(data, mine):
+    (mine / "previews").mkdir()
+    (mine / "previews/step_1.png").write_bytes(b"mine")
+    assert train(data, mine, "--steps", "1", "--overwrite") == DONE
+    assert (mine / "previews/step_1.png").read_bytes() == b"mine"
+
+
 def test_an_export_is_replaced_as_asked(done, mine):
     (mine / "mesh.obj").write_text("mine")
     assert command("export", done, "--out", mine, "--formats", "obj", "--overwrite") == DONE

@@ -62,21 +62,6 @@ def test_a_part_that_may_take_long_is_said_at_once(clock, capsys):
     assert capsys.readouterr().err == "  0% 00:00<? first\n"
 
 
-def test_a_line_beside_the_bar_stands_alone_and_the_clock_goes_on(monkeypatch):
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
-    with Progress(0.25) as bar:
-        bar.show(0.5, "step 7")
-        with bar.aside():
-            cleared = terminal.getvalue()
-            terminal.write("a line\n")
-        assert cleared.endswith("\r") and cleared.split("\r")[-2].strip() == ""
-        assert "step 7" in terminal.getvalue().rpartition("a line\n")[2]
-        shown = terminal.getvalue()
-        bar.show(0.5, "step 7")
-        assert len(terminal.getvalue()) > len(shown)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_asks_and_the_second_is_as_before(number):
     seen = []

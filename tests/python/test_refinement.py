@@ -22,8 +22,8 @@ from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.outline import fit_outline
 from splitnerf.refinement.pixels import PixelFilter, brightest_around, covered_pixels
 from splitnerf.refinement.refine import fitting_height
-from splitnerf.refinement.stage import refine
-from splitnerf.refinement.texels import AssetTexels, frames_of, materials_of, patch_width
+from splitnerf.refinement.stage import Refined, Stage
+from splitnerf.refinement.texels import AssetTexels, frames_of, materials_of, patch_width, texels_per_pixel
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
 
@@ -199,6 +199,14 @@ def test_texels_on_both_sides_of_a_seam_are_neighbours():
     assert (turned - tilts[i])[seam].abs().max() < 0.02  # what the surface bends between the two
 
 
+def refine(*arguments) -> Refined:
+    """A refinement with all its sweeps."""
+    stage = Stage(*arguments)
+    while not stage.finished:
+        stage.advance()
+    return stage.result()
+
+
 @pytest.fixture(scope="module")
 def refined(painted):
     """The ball from a wrong start, under the true light."""
@@ -325,6 +333,8 @@ def test_a_sweep_has_no_more_pixels_than_it_may(painted, monkeypatch):
 def test_a_patch_is_two_pixels_wide(painted):
     """Texels share the ball's area of 4 pi; a pixel is 3.4 / 60 wide at its middle."""
     mesh = trimesh.creation.icosphere(subdivisions=3)
-    texels = AssetTexels(textured(mesh.vertices, mesh.faces, 256))
-    edge = np.sqrt(4 * np.pi / len(texels.index))
-    assert patch_width(painted[1], texels) == pytest.approx(2 * 3.4 / 60 / edge, abs=0.55)
+    asset = textured(mesh.vertices, mesh.faces, 256)
+    edge = np.sqrt(4 * np.pi / len(AssetTexels(asset).index))
+    pixel = texels_per_pixel(painted[1], asset)
+    assert pixel == pytest.approx(3.4 / 60 / edge, rel=0.05)
+    assert patch_width(pixel) == round(2 * pixel) and patch_width(0.1) == 1

@@ -276,7 +276,6 @@ def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
     finished = calls(monkeypatch, loop.Training, "finish", lambda self: self)
     train_scene(dataset, config, tmp_path)
     one, other = finished[0], loop.Training(dataset, config.replace({"seed": 8}), tmp_path, torch.device("cpu"))
-    one.model.light.loss_samples.restore([0.25, 0.5])
     one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
     one.mesh.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
     cached = one.model.bits.state()

@@ -43,9 +43,10 @@ def texture(points: np.ndarray, frequency: float = 18.0) -> np.ndarray:
 
 
 def photographed(
-    n: int, size: int, frequency: float, mesh: trimesh.Trimesh | None = None
+    n: int, size: int, frequency: float, mesh: trimesh.Trimesh | None = None, mirrored: float = 0.0
 ) -> tuple[stereo.GreyPhotos, torch.Tensor]:
-    """n photos of the box or another mesh, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside it."""
+    """n photos of the box or another mesh, each pixel the texture where its ray hits, and the true depths [n, h, w]; 0 beside it.
+    `mirrored`: how far from there along the ray that a ball reflects the texture is."""
     mesh = open_box() if mesh is None else mesh
     poses = torch.from_numpy(spiral(n, 3.0, (20, 80))).float()
     focal = 0.5 * size / math.tan(0.35)
@@ -54,7 +55,10 @@ def photographed(
     for i in range(n):
         rays_o, rays_d = (x.numpy() for x in stereo.image_rays(poses[i], lens, size, size))
         points, rays, _ = mesh.ray.intersects_location(rays_o, rays_d, multiple_hits=False)
-        grey[i, rays], depths[i, rays] = texture(points, frequency), np.linalg.norm(points - rays_o[rays], axis=1)
+        outward = points / np.linalg.norm(points, axis=1, keepdims=True)
+        reflected = rays_d[rays] - 2 * (rays_d[rays] * outward).sum(1, keepdims=True) * outward
+        grey[i, rays] = texture(points + mirrored * reflected, frequency)
+        depths[i, rays] = np.linalg.norm(points - rays_o[rays], axis=1)
     depths = torch.from_numpy(depths).view(n, size, size)
     photos = stereo.GreyPhotos(torch.from_numpy(grey).view_as(depths), depths > 0, poses, lens.expand(n, 4))
     return photos, depths
@@ -109,6 +113,7 @@ def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
     monkeypatch.setattr(start, "grey_photos", sized)
     monkeypatch.setattr(start, "FINE_PASSES", start.FINE_PASSES[-1:])
     monkeypatch.setattr(start, "FULL_FINE", 0.7)  # this box has thick walls
+    monkeypatch.setattr(start, "FOLLOWED", 0.6)  # one pass of three leaves the surface beside its place
     shape = start.start_shape(SimpleNamespace(height=300, width=size), hull(), preset("cpu"))
     if size < 200:
         assert shape is None
@@ -123,6 +128,20 @@ def test_a_solid_object_begins_with_a_sphere_however_clear_its_depths(monkeypatc
     assert (stereo.depth_maps(photos, hull(), BOX)[2] > MARGIN).sum() > CLEAR_SHARE * photos.masks.sum()
     monkeypatch.setattr(start, "grey_photos", lambda *_: photos)
     assert start.start_shape(SimpleNamespace(height=50, width=50), hull(), preset("cpu")) is None
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_a_mirror_shows_is_no_surface(mirrored, monkeypatch):
+    """Surroundings 1 away in a ball look like surfaces in it, but not like one. The box's cavity is one."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.6)
+    what = (24, 50, 6.0, ball, 1.0) if mirrored else (24, 50, 18.0)
+    photos = photographed(*what)[0]
+    assert (stereo.depth_maps(photos, hull(), BOX)[2] > MARGIN).sum() > CLEAR_SHARE * photos.masks.sum()
+    monkeypatch.setattr(start, "grey_photos", lambda *_: photos)
+    monkeypatch.setattr(start, "PASSES", start.PASSES[1:4] + start.PASSES[5:])
+    monkeypatch.setattr(start, "FULL", 0.7)  # this box has thick walls
+    shape = start.start_shape(SimpleNamespace(height=50, width=50), hull(), preset("cpu"))
+    assert (shape is None) == mirrored
 
 
 def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found):

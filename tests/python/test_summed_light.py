@@ -57,7 +57,7 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     )
     one, material = torch.ones(200, 3), {"albedo": albedo, "roughness": rough, "metallic": metal}
     split = split_sum_shade(n, views, **material, specular=light[:200], diffuse=light[200:], compensate=True)
-    points = ShadedPoints(split, n, albedo, rough, metal, one, one, n, n, 0.5 * n)
+    points = ShadedPoints(split, n, albedo, rough, metal, one, one, n, 0.5 * n)
     every = torch.arange(len(n))
     summed = split.index_add(0, *model.quadrature_correction(lit, views, points, every))
     bright = n @ model.light.axis > 0

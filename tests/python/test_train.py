@@ -88,7 +88,7 @@ MLP_LIGHT = ONE_CELL | {"light.kind": "mlp", "shading.method": "split", "occlusi
 RESUMED = {
     "a convex surface": ONE_CELL | {"open_below": 0.0, "grid_every": 8},
     "sparse steps": ONE_CELL | {"sparse_steps": True, "table_dtype": "float16"},
-    "an MLP of the light": MLP_LIGHT | {"light_noise": 0.0},
+    "an MLP of the light": MLP_LIGHT,
 }
 # A dented surface is one that blocks some of its own sky.
 DENTED = ONE_CELL | {"learning_rate": 0.05, "warmup_steps": 1, "levels_open_by": 0.0, "open_below": 0.0}
@@ -97,7 +97,6 @@ RESUMED |= {
     "the light that weighs the bits": DENTED | {"indirect": False},
     "the light that the mesh sends": DENTED | {"indirect_every": 16},
     "the light that weighs the rays": DENTED | {"occlusion.kind": "mlp", "shading.method": "split"},
-    "the light loss's noise": MLP_LIGHT | {"light_noise": 0.5, "light_samples": 512},
 }
 
 

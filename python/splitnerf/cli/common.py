@@ -182,6 +182,8 @@ def print_refinement(summary: dict | None) -> None:
         print("a lamp that training had smeared was made compact first; photos do not tell which of the two it was")
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
+    if summary["detail"]:
+        print("the albedo has detail as fine as the photos show it, in {0} x {0} texels".format(summary["detail"]))
     if not summary["normal_texture"]:
         print("no normal texture is delivered: the photos held out fit the mesh's own normals as well")
 

@@ -37,7 +37,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     from splitnerf.config.settings import UNLIMITED
     from splitnerf.refinement.fit import FitSettings
-    from splitnerf.refinement.refine import refine_run
+    from splitnerf.refinement.refine import STATE, refine_run, source_of
     from splitnerf.run_folder import REFINED, check_results, data_of, refuse_no_run
 
     if not args.minutes >= 0:
@@ -50,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or args.run / REFINED
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give --out a folder")
-    check_results(out, args.run, overwrite=args.overwrite or args.resume)
+    if out.resolve() == source_of(args.run).resolve():
+        raise InputError(f"{out}: holds the asset to refine, which this would replace; give another --out")
+    check_results(out, args.run, overwrite=args.overwrite or (args.resume and (out / STATE).is_file()))
     data, downscale = data_of(args.run) or (None, 1)
     if args.data is None and data is None:
         raise InputError(f"{args.run}: does not say where its data are, or they are gone; give --data")

@@ -42,10 +42,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add = parser.add_argument
     add("data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for")
     add("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
-    add_alias(parser, "--output-dir", "--out")
     add_training_options(parser)
     add("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
-    add_alias(parser, "--downscale-factor", "--downscale")
     add_reading_options(parser)
     add(
         "--resume",
@@ -68,13 +66,6 @@ def port(text: str) -> int:
     return int(text)
 
 
-def add_alias(parser: argparse.ArgumentParser, alias: str, option: str) -> None:
-    """Accepts another program's name of an option, which the help does not list."""
-    of = next(action for action in parser._actions if option in action.option_strings)
-    add = parser.add_argument
-    add(alias, dest=of.dest, type=of.type, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
-
-
 def add_training_options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
@@ -83,8 +74,6 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
     add("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
-    add_alias(parser, "--max-num-iterations", "--steps")
-    add_alias(parser, "--n_steps", "--steps")
     add(
         "--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it"
     )

@@ -29,7 +29,7 @@ class RunSettings:
     cuda_graphs: bool = setting(
         False, "launches of a step on a GPU recorded and replayed; the number of rays then changes seldom"
     )
-    preview_every: float = setting(0.1, "time between two previews", unit=OF_RUN)
+    preview_every: float = setting(0.1, "time between two previews; 1: none before the end", unit=OF_RUN, above=0)
     checkpoint_minutes: float = setting(2.0, "time between two checkpoints", unit="minutes")
 
 
@@ -162,9 +162,6 @@ class OcclusionSettings:
         choices=("mlp", "bits", "off"),
     )
     channels: int = setting(3, "colours with factors of their own; 1: their mean (the paper)", choices=(1, 3))
-    directional: bool = setting(
-        True, "specular factor as a function of the reflection; false: of position alone (the paper)"
-    )
     indirect: bool = setting(True, "light from the object itself, with bits")
 
 
@@ -172,7 +169,7 @@ class OcclusionSettings:
 class MeshSettings:
     """The mesh that occlusion is traced on while training."""
 
-    every: float = setting(0.1, "time between two meshes", unit=OF_RUN)
+    every: float = setting(0.1, "time between two meshes", unit=OF_RUN, above=0)
     resolution: int = setting(
         96, "nodes of marching cubes along an edge", unit="nodes", at_least=MIN_EXPORT_SIZE, at_most=2048
     )
@@ -268,7 +265,7 @@ class Constants:
     lists it."""
 
     # signed distance
-    box: float = number(1.5, above=0, at_most=FARTHEST)  # half the edge of the scene's box
+    box: float = number(1.5, at_least=1e-3, at_most=FARTHEST)  # half the edge of the scene's box
     base_resolution: int = number(16, at_least=1, at_most=4096)  # cells of the coarsest level along an edge
     start_levels: int = number(4)
     levels_open_by: float = number(0.4)
@@ -318,8 +315,7 @@ class Constants:
     # consistency of the light as an MLP
     light_form: str = number("smooth_l1", choices=("square", "smooth_l1"))  # square: the paper; else the released code
     light_set: str = number("fibonacci", choices=("fibonacci", "uniform", "uniform_and_queries"))  # likewise
-    light_samples: int = number(2048, at_least=2)  # most directions
-    light_noise: float = number(0.1)  # share of the term's squared error that noise may make; 0: all light_samples
+    light_samples: int = number(2048, at_least=1)  # directions
     light_queries: int = number(512, at_least=1)
     light_lobe_below: float = number(0.15)  # roughness of lobes with directions of their own
     light_lobe_samples: int = number(16, at_least=1)

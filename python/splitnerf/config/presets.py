@@ -22,7 +22,7 @@ PAPER = dict(
     materials=dict(inputs="outputs"),
     light=dict(kind="mlp"),
     shading=dict(method="split", fresnel="paper", query="reflection", compensate=False, compositing="srgb"),
-    occlusion=dict(kind="mlp", channels=1, directional=False, indirect=False),
+    occlusion=dict(kind="mlp", channels=1, indirect=False),
     mesh=dict(resolution=512, background=True),
     sampling=dict(target_samples=262144, min_weight=0.0, occupancy="average", grid_resolution=128, pixel_cells=0.0),
     losses=dict(
@@ -71,7 +71,6 @@ PAPER = dict(
         light_form="square",
         light_set="uniform",
         light_samples=8129,
-        light_noise=0.0,
         light_queries=8129,
         light_lobe_below=0.0,
         eikonal_points=0,

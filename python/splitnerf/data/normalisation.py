@@ -99,7 +99,7 @@ def _similarity(centre: np.ndarray, radius: float) -> np.ndarray:
 def _check_places(poses: np.ndarray) -> None:
     """Raises ValueError where all cameras stand at one place."""
     places = poses[:, :3, 3]
-    if np.ptp(places, axis=0).max() <= SAME_PLACE * max(1.0, np.abs(places).max()):
+    if np.ptp(places, axis=0).max() <= SAME_PLACE * np.abs(places).max():
         many = f"all {len(poses)} cameras stand at one place, as if nothing had estimated the poses; estimate them"
         raise ValueError(
             many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides"
@@ -174,7 +174,7 @@ class MaskView:
         height, width = self.table.shape[0] - 1, self.table.shape[1] - 1
         fx, fy, cx, cy = self.intrinsics
         local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-        ahead = -local[:, 2] > 1e-6
+        ahead = -local[:, 2] > 1e-6 * np.linalg.norm(local, axis=1)
         depth = np.where(ahead, -local[:, 2], 1.0)
         x, y = cx + fx * local[:, 0] / depth, cy - fy * local[:, 1] / depth
         visible = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)

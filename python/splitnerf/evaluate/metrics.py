@@ -80,9 +80,9 @@ def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
     return float(angles_deg(prediction, truth).mean())
 
 
-def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray, threshold: float = 0.5) -> float:
-    """Mean recall over the classes (above the threshold: metal; not metal) that the truth [m] in [0, 1] has."""
-    predicted, actual = np.asarray(prediction) > threshold, np.asarray(truth) > threshold
+def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray) -> float:
+    """Mean recall over the classes (above 0.5: metal; not metal) that the truth [m] in [0, 1] has."""
+    predicted, actual = np.asarray(prediction) > 0.5, np.asarray(truth) > 0.5
     return float(np.mean([(predicted == actual)[actual == c].mean() for c in (False, True) if (actual == c).any()]))
 
 

@@ -26,8 +26,6 @@ from splitnerf.ops import (
     zonal_factors,
 )
 
-SAMPLES_RATE = 0.03  # update rate of the running means that decide the light loss's number of directions
-FEWEST_SAMPLES = 64
 CHAIN = (0.1, 0.15, 0.2, 0.3, 0.4)  # roughness of the filtered maps whose lobe is wider than a texel
 BASE_NODE = 0.05  # up to this roughness the texels are read unfiltered
 LOBE_WIDTH = 2.57  # full width of the lobe at half its height, in units of ggx_alpha
@@ -37,43 +35,6 @@ SH_RESOLUTION = 64  # largest resolution of the averages that the harmonics are 
 ZONAL_ROWS = 129
 LOG_LIMIT = 12.0
 TEXEL_PARTS = 4  # parts of a texel along its edge, for its solid angle
-
-
-class LightSamples:
-    """Chooses the number of directions for the light's consistency loss: the noise of the loss's integrals is kept at a
-    given share of the squared error that the loss measures.
-
-    Noise and error are running means, because in many steps no direction hits a small lamp.
-    """
-
-    def __init__(self) -> None:
-        self.variance = self.squared_error = 0.0
-
-    def learn(self, noise: float, squared_error: float, n: int) -> None:
-        """Updates the running means with one step: the variance of its integrals over n directions, and its squared
-        error."""
-        rate = SAMPLES_RATE if self.squared_error else 1.0
-        self.variance += rate * (noise * n - self.variance)
-        self.squared_error += rate * (squared_error - self.squared_error)
-
-    def state(self) -> Tensor:
-        """The two running means [2] float64, for a checkpoint."""
-        return torch.tensor([self.variance, self.squared_error], dtype=torch.float64)
-
-    def restore(self, state: Sequence[float]) -> None:
-        """Restores the running means that :meth:`state` returned."""
-        self.variance, self.squared_error = state
-
-    def count(self, share: float, most: int) -> int:
-        """The number of directions for the next step, in [64, ``most``]; ``most`` before the first step.
-
-        Args:
-            share: The target ratio of noise to squared error, positive.
-            most: The largest number of directions.
-        """
-        if not self.squared_error:
-            return most
-        return int(min(most, max(FEWEST_SAMPLES, self.variance / (share * self.squared_error))))
 
 
 class LightTexels(NamedTuple):
@@ -196,7 +157,6 @@ class Light(nn.Module, abc.ABC):
     Attributes:
         needs_consistency_loss: Whether g(w, rho) agrees with g(w, 0) only through ``losses.light_loss``. False where
             they agree by construction.
-        loss_samples: The choice of the number of light directions for that loss.
 
     Source: SplitNeRF Eq. (8)-(11).
     """
@@ -205,7 +165,6 @@ class Light(nn.Module, abc.ABC):
 
     def __init__(self) -> None:
         super().__init__()
-        self.loss_samples = LightSamples()
 
     @abc.abstractmethod
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:

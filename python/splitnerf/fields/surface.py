@@ -204,28 +204,21 @@ class MaterialHead(nn.Module):
 
 
 class OcclusionHead(nn.Module):
-    """Predicts the occlusion factors o_d and o_s of a point, 1 = open.
+    """Predicts the occlusion factors o_d and o_s of a point, 1 = open, from its position alone.
 
-    With ``directional`` the specular factor also depends on the lobe's axis and width. Without it the head is the
-    paper's, which depends on position alone. The output biases start at +2, mostly open; this choice is ours.
+    The output biases start at +2, mostly open; this choice is ours.
 
     Source: SplitNeRF Eq. (12)-(15).
     """
 
-    def __init__(self, n_inputs: int, width: int, n_layers: int, n_channels: int, directional: bool):
+    def __init__(self, n_inputs: int, width: int, n_layers: int, n_channels: int):
         super().__init__()
-        self.n_channels, self.directional = n_channels, directional
-        self.net = relu_mlp(n_inputs + (10 if directional else 0), width, n_layers, 2 * n_channels)
+        self.n_channels = n_channels
+        self.net = relu_mlp(n_inputs, width, n_layers, 2 * n_channels)
         with torch.no_grad():
             self.net[-1].bias.fill_(2.0)
 
-    def forward(self, features: Sequence[Tensor], lobe_dirs: Tensor, roughness: Tensor) -> Occlusion:
-        """features [n, columns], n_inputs columns together -> factors [n, n_channels]. No gradient flows to the unit
-        axes [n, 3] and the roughness [n, 1] of the lobes."""
-        inputs = list(features)
-        if self.directional:
-            x, y, z = lobe_dirs.detach().unbind(-1)
-            products = torch.stack([x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1, z * z * z], dim=-1)
-            inputs += [lobe_dirs.detach(), products, roughness.detach()]
-        out = torch.sigmoid(self.net(torch.cat(inputs, dim=-1)))
+    def forward(self, features: Sequence[Tensor]) -> Occlusion:
+        """features [n, columns], n_inputs columns together -> factors [n, n_channels]."""
+        out = torch.sigmoid(self.net(torch.cat(list(features), dim=-1)))
         return Occlusion(out[:, : self.n_channels], out[:, self.n_channels :])

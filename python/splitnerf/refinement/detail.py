@@ -29,13 +29,13 @@ from splitnerf.data.asset import Asset, unit
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import srgb_to_linear
-from splitnerf.data.lens import pixel_width
 from splitnerf.export.bake import nearest_rows, rasterise
 from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light
 from splitnerf.refinement.fit import MIN_TONE, srgb_slope
 from splitnerf.refinement.light import footprints, read
 from splitnerf.refinement.pixels import HELD_OUT, MIN_ALPHA
-from splitnerf.refinement.texels import bilinear_footprints, charts
+from splitnerf.refinement.texels import bilinear_footprints, charts, texels_per_pixel
+from splitnerf.render.seen import in_view
 
 # Widths of a texel in the photos' pixels: up to which a texture is fine enough, and below which photos tell less than the fit.
 FINE_ENOUGH, LEAST_WIDTH = 1.5, 0.75
@@ -140,24 +140,17 @@ class FineTexels:
         self.windows = Windows(covered.index, chart, size, WINDOW * size // before)
 
     def shown_in(self, dataset: Dataset, view: int) -> Shown:
-        """The texels that a photo shows: the object covers them, and nothing of it is in between."""
-        photo, pose = dataset.images[view], torch.from_numpy(dataset.world_poses[view]).float()
-        fx, fy, cx, cy = dataset.intrinsics[view].tolist()
-        to_camera = pose[:3, 3] - self.positions
-        distance = to_camera.norm(dim=1, keepdim=True)
-        cosine = (to_camera * self.normals).sum(1, keepdim=True) / distance
-        x, y, z = (-to_camera @ pose[:3, :3]).unbind(1)
-        at = torch.stack([cx - fx * x / z, cy + fy * y / z], dim=1) / torch.tensor(photo.shape[1::-1]) * 2 - 1
-        rows = torch.nonzero((z < 0) & (cosine[:, 0] > GRAZING) & (at.abs() < 1).all(1))[:, 0]
+        """The texels that a photo shows, and that its mask covers."""
+        photo, size = dataset.images[view], torch.from_numpy(dataset.sizes[view])
+        pose, lens = (torch.from_numpy(x[view]).float() for x in (dataset.world_poses, dataset.intrinsics))
+        seen = in_view(self.scene, self.positions, self.normals, (pose, lens, size), self.offset, GRAZING)
         planes = np.concatenate([srgb_to_linear(photo[..., :3]), photo[..., 3:]], axis=2)
         planes = torch.from_numpy(planes).permute(2, 0, 1)[None]
-        seen = F.grid_sample(planes, at[rows][None, None], align_corners=False)[0, :, 0].T
-        covered = seen[:, 3] >= MIN_ALPHA
-        rows, seen = rows[covered], seen[covered]
-        starts = self.positions[rows] + self.offset * self.normals[rows]
-        is_open = self.scene.is_open(starts, pose[:3, 3] - starts, 1.0)
-        rows, seen = rows[is_open], seen[is_open]
-        return Shown(rows, seen[:, :3], cosine[rows] * (fx / distance[rows]).square())
+        at = seen.at / size.flip(0) * 2 - 1
+        colours = F.grid_sample(planes, at[None, None], align_corners=False)[0, :, 0].T
+        pixels = seen.cosine * (lens[0] / seen.distance).square()
+        rows = colours[:, 3] >= MIN_ALPHA
+        return Shown(seen.rows[rows], colours[rows, :3], pixels[rows, None])
 
     def tells(self, shown: Shown) -> Told:
         """What a photo tells of the texels that it shows."""
@@ -216,12 +209,7 @@ def scattered_light(asset: Asset, scene: MeshScene, light: Tensor, size: int) ->
 def detail_size(dataset: Dataset, asset: Asset, most: int) -> int | None:
     """The edge of the texture that photos fill with detail: the present one, times a power of 2 if they need it and at most
     `most`; None where photos are too coarse, or too few to hold one out, or `most` is 0."""
-    size, corners = asset.materials[0].albedo_texture.shape[0], asset.vertices[asset.triangles].astype(np.float64)
-    surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    flat = asset.uv[asset.triangles].astype(np.float64)
-    (ux, uy), (vx, vy) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
-    texel = math.sqrt(surface / max(np.abs(ux * vy - uy * vx).sum(), 1e-12)) / size
-    width = texel / pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
+    size, width = asset.materials[0].albedo_texture.shape[0], 1.0 / texels_per_pixel(dataset, asset)
     if most == 0 or width < LEAST_WIDTH or len(dataset) <= HELD_OUT // 2:
         return None
     while width > FINE_ENOUGH and 2 * size <= most:

@@ -34,7 +34,14 @@ from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.pixels import HELD_OUT, PixelFilter, covered_pixels, held_out
 from splitnerf.refinement.similar_texels import usual_gloss
-from splitnerf.refinement.texels import PATCH_PIXELS, AssetTexels, SurfaceSamples, materials_of, patch_width
+from splitnerf.refinement.texels import (
+    PATCH_PIXELS,
+    AssetTexels,
+    SurfaceSamples,
+    materials_of,
+    patch_width,
+    texels_per_pixel,
+)
 from splitnerf.refinement.unknowns import (
     GROUPS,
     METALLIC,
@@ -151,6 +158,10 @@ class Refinement:
         asset: An asset with one material, textured with albedo, roughness-metallic and normals of one square size.
         environment: [h, 2 h, 3] linear radiance to start from, h = 8 2^k.
         settings: What the fit does.
+
+    Attributes:
+        patch_width: See :func:`splitnerf.refinement.texels.patch_width`.
+        sightings: How many pixels of all photos there are for each pixel's width squared of the surface, on average.
     """
 
     def __init__(self, dataset: Dataset, asset: Asset, environment: np.ndarray, settings: FitSettings):
@@ -172,8 +183,10 @@ class Refinement:
         self.random = np.random.default_rng(s.seed)
         like = torch.zeros(N_UNKNOWNS)
         like[ROUGHNESS], like[METALLIC] = LIKE_ROUGHNESS, LIKE_METAL
-        width = self.patch_width = patch_width(dataset, self.texels)
-        smooth = max(1.0, width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
+        pixel = texels_per_pixel(dataset, asset)
+        self.patch_width = patch_width(pixel)
+        self.sightings = len(self.pixels) * pixel**2 / max(len(self.texels.index), 1)
+        smooth = max(1.0, self.patch_width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         self.prior = Prior(
             pairs=self.texels.pairs,
             frames=self.texels.frames,

@@ -248,7 +248,7 @@ def record_of(refined: Refined, seconds: float) -> dict:
         "held_out": list(refined.held),
         "delivered": refined.delivered,
         "normal_texture": refined.asset.materials[0].normal_texture is not None,
-        "albedo_size": refined.asset.materials[0].albedo_texture.shape[0],
+        "detail": refined.detail,
         "sweeps": [sweep._asdict() for sweep in refined.sweeps],
     }
 
@@ -265,6 +265,7 @@ def refinement_summary(run: Path) -> dict:
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
         "normal_texture": record.get("normal_texture", True),  # runs from before it could be left out
+        "detail": record.get("detail"),  # runs from before there was any
         "lamp": record["lamp"] is not None,
         "saturated": record["saturated"],
     }

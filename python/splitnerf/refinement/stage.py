@@ -24,7 +24,6 @@ from splitnerf.refinement.outline import ROUNDS, fit_outline
 from splitnerf.refinement.texels import check_form
 from splitnerf.refinement.unknowns import to_values
 
-BIASED = 1.05  # factor on the error of held-out pixels at the start, which training has fitted, as the trained asset has them
 PATIENCE = 6  # sweeps after the best one, after which the fit ends
 LEAST_SWEEPS = 4  # that fit into the minutes of a refinement: a longer sweep gathers fewer pixels
 DETAIL_SHARE = 0.25  # of the minutes, kept for the detail where the photos show more than the textures hold
@@ -46,6 +45,7 @@ class Refined:
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
         level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`; 1: it was not.
+        detail: The edge of the albedo's texture, which has the photos' detail; None where it has none.
     """
 
     asset: Asset
@@ -57,6 +57,7 @@ class Refined:
     saturated: float
     lamp: CompactLamp | None
     level: float
+    detail: int | None
 
 
 class Sweep(NamedTuple):
@@ -162,7 +163,16 @@ class Stage:
             self.lamp = self.fit.make_lamp_compact()
         if self.lamp is not None:  # photos do not tell a compact lamp from a smeared one: steps are judged with it
             start = self.fit.held_errors()
-        self.best = self.last = self._candidate(0, BIASED * start)
+        self.best = self.last = self._candidate(0, self.unseen * start)
+
+    @property
+    def unseen(self) -> float:
+        """The factor by which errors of held-out pixels would be larger at the start had training not fitted them, too.
+
+        The mean of n noisy values has 1 - 1/n of their variance to those values and 1 + 1/n to others. Training is smoother:
+        it counts as the mean of twice the sightings.
+        """
+        return 1.0 + 1.0 / max(self.fit.sightings, 1.0)
 
     def _candidate(self, number: int, held: np.ndarray) -> Candidate:
         return Candidate(number, held.tolist(), self.fit.unknowns, self.fit.light.levels)
@@ -258,7 +268,7 @@ class Stage:
         judge.light.levels = chosen.light
         judge.unknowns = chosen.unknowns.clone()
         judge.unknowns[:, -2:] = 0.0  # tilts
-        held = [error / (1.0 if chosen.number else BIASED) for error in chosen.held]
+        held = [error / (1.0 if chosen.number else self.unseen) for error in chosen.held]
         return Candidate(0, judge.held_errors().tolist(), judge.unknowns, chosen.light).is_worse(
             chosen._replace(held=held)
         )
@@ -275,29 +285,17 @@ class Stage:
             asset = with_detail(
                 self.dataset, asset, light, self.albedo_size, left, lambda share: self.show(share, "refinement, detail")
             )
-        held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else BIASED))
+        held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else self.unseen))
         saturated = float(fit.pixels.saturated.mean())
-        return Refined(asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level)
-
-
-def refine(
-    dataset: Dataset,
-    asset: Asset,
-    environment: np.ndarray,
-    settings: FitSettings,
-    report: Callable[[Sweep], None] = lambda sweep: None,
-) -> Refined:
-    """Fits an asset's outline, its textures and the light to photos; see :class:`Refinement` for the arguments.
-
-    Args:
-        report: Called after each sweep.
-
-    Raises:
-        ValueError: The asset or the light has another form than :class:`Refinement` takes.
-        InputError: The photos show nothing of the asset.
-        RuntimeError: Numbers are no longer finite.
-    """
-    stage = Stage(dataset, asset, environment, settings)
-    while not stage.finished:
-        report(stage.advance())
-    return stage.result()
+        return Refined(
+            asset,
+            light,
+            self.outline,
+            self.sweeps,
+            held,
+            chosen.number,
+            saturated,
+            self.lamp,
+            fit.level,
+            self.albedo_size,
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -237,10 +238,16 @@ def frames_of(normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(normals, x) * np.sign(tangents[:, 3:])], axis=1)
 
 
-def patch_width(dataset: Dataset, texels: AssetTexels) -> int:
-    """The edge in texels of a patch that is PATCH_PIXELS pixels of the photos wide."""
-    asset = texels.asset
-    a, b, c = (asset.vertices[asset.triangles[:, i]].astype(np.float64) for i in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    pixel = pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
-    return max(1, round(PATCH_PIXELS * pixel / np.sqrt(area / max(len(texels.index), 1))))
+def texels_per_pixel(dataset: Dataset, asset: Asset) -> float:
+    """The width of a photo's pixel in texels of the asset's albedo, in the middle of the asset."""
+    size, corners = asset.materials[0].albedo_texture.shape[0], asset.vertices[asset.triangles].astype(np.float64)
+    surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    flat = asset.uv[asset.triangles].astype(np.float64)
+    (ux, uy), (vx, vy) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
+    texel = math.sqrt(surface / max(np.abs(ux * vy - uy * vx).sum(), 1e-12)) / size
+    return pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0)) / texel
+
+
+def patch_width(pixel: float) -> int:
+    """The edge in texels of a patch that is PATCH_PIXELS pixels of the photos wide, from the pixels' width in texels."""
+    return max(1, round(PATCH_PIXELS * pixel))

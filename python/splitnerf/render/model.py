@@ -48,7 +48,6 @@ class ShadedPoints(NamedTuple):
         roughness, metallic: [n, 1] in [0, 1]; the roughness is perceptual.
         occlusion_d, occlusion_s: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open.
         facing: [n, 3] unit normals, on the viewer's side.
-        lobe_dirs: [n, 3] unit query directions of the specular light.
         on_surface: [n, 3] the points moved on to the surface, scene units; no gradient.
     """
 
@@ -60,7 +59,6 @@ class ShadedPoints(NamedTuple):
     occlusion_d: Tensor
     occlusion_s: Tensor
     facing: Tensor
-    lobe_dirs: Tensor
     on_surface: Tensor
 
 
@@ -128,7 +126,7 @@ class SceneModel(nn.Module):
         n_inputs = N_OUTPUTS + (3 + spec.n_outputs if config.materials.inputs == "grid" else 0)
         roughness = c.initial_roughness, c.min_roughness
         self.material = MaterialHead(n_inputs, c.materials_width, HEAD_LAYERS, *roughness)
-        head = n_inputs, c.occlusion_width, HEAD_LAYERS, config.occlusion.channels, config.occlusion.directional
+        head = n_inputs, c.occlusion_width, HEAD_LAYERS, config.occlusion.channels
         self.occlusion = OcclusionHead(*head) if kind == "mlp" else None
         self.cells = SkyCells(c.occlusion_directions) if kind == "bits" else None
         self.bits: VisibilityBits | None = None
@@ -201,7 +199,7 @@ class SceneModel(nn.Module):
         if self.bits is not None and not self.bits.is_unoccluded:
             return self.bits(positions, normals, lobe_dirs, roughness, segments)
         if self.occlusion is not None and self.has_mesh:
-            return self.occlusion(inputs, lobe_dirs, roughness)
+            return self.occlusion(inputs)
         ones = torch.ones_like(roughness).expand(-1, self.config.occlusion.channels)
         return Occlusion(ones, ones)
 
@@ -246,7 +244,7 @@ class SceneModel(nn.Module):
             indirect_s=i_s,
             indirect_d=i_d,
         )
-        return ShadedPoints(shaded, normals, *materials, o_d, o_s, facing, lobe_dirs, surface)
+        return ShadedPoints(shaded, normals, *materials, o_d, o_s, facing, surface)
 
     def quadrature_correction(
         self,

@@ -36,29 +36,67 @@ class Cameras(NamedTuple):
         return cls(poses, intrinsics, torch.from_numpy(photos.sizes).long())
 
 
+class InView(NamedTuple):
+    """The points that a photo shows.
+
+    Attributes:
+        rows: [r] int64 their numbers.
+        at: [r, 2] float32 their image points, pixels.
+        cosine: [r] float32 of the surface's normal and the line of sight.
+        distance: [r] float32 from the camera.
+    """
+
+    rows: Tensor
+    at: Tensor
+    cosine: Tensor
+    distance: Tensor
+
+
+def in_view(
+    scene: MeshScene,
+    points: Tensor,
+    normals: Tensor,
+    camera: tuple[Tensor, Tensor, Tensor],
+    offset: float,
+    least: float,
+) -> InView:
+    """The points of a surface that a photo shows: within its frame, from the front, with nothing of the mesh in between.
+
+    Args:
+        scene: The mesh.
+        points, normals: [n, 3] float32, the normals of unit length and outward.
+        camera: Pose [4, 4], intrinsics [4] and size [2], as :class:`Cameras` has them.
+        offset: How far in front of the surface a line of sight begins.
+        least: Cosine of the normal and a line of sight below which the photo does not show the point.
+    """
+    pose, lens, size = camera
+    starts = points + offset * normals
+    to_camera = pose[:3, 3] - starts
+    distance = to_camera.norm(dim=1)
+    cosine = (to_camera * normals).sum(1) / distance
+    in_camera = -to_camera @ pose[:3, :3]
+    at = projected(in_camera, lens)
+    in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < size.flip(0)).all(1)
+    rows = torch.nonzero(in_frame & (cosine > least))[:, 0]
+    rows = rows[scene.is_open(starts[rows], to_camera[rows], 1.0)]
+    return InView(rows, at[rows], cosine[rows], distance[rows])
+
+
 def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, offset: float) -> np.ndarray:
-    """[n] bool, whether a photo shows a vertex: within its frame, from the front, with nothing of the mesh in between.
+    """[n] bool, whether a photo shows a vertex, see :func:`in_view`.
 
     Args:
         vertices, faces: The mesh, [n, 3] float32 scene units, and [m, 3], outward.
         cameras: The photos' cameras.
         offset: How far in front of the surface a line of sight begins, scene units.
     """
-    scene = MeshScene(vertices, faces)
-    normals = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, np.float32)
-    starts, seen = vertices + offset * normals, np.zeros(len(vertices), bool)
-    for pose, lens, size in zip(*cameras):
-        places = torch.from_numpy(starts[~seen]) - pose[:3, 3]
-        in_camera = places @ pose[:3, :3]
-        at = projected(in_camera, lens)
-        in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < size.flip(0)).all(1)
-        to_camera = -places / places.norm(dim=1, keepdim=True)
-        in_front = (to_camera.numpy() * normals[~seen]).sum(1) > GRAZING
-        rows = np.flatnonzero(in_frame.numpy() & in_front)
-        candidates = np.flatnonzero(~seen)[rows]
-        hit, _, _ = scene.trace_closest(starts[candidates], to_camera.numpy()[rows])
-        seen[candidates[hit < 0]] = True
-    return majority(faces, seen)
+    scene, points = MeshScene(vertices, faces), torch.from_numpy(vertices)
+    normals = torch.tensor(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, dtype=torch.float32)
+    seen = torch.zeros(len(vertices), dtype=torch.bool)
+    for camera in zip(*cameras):
+        rest = torch.nonzero(~seen)[:, 0]
+        seen[rest[in_view(scene, points[rest], normals[rest], camera, offset, GRAZING).rows]] = True
+    return majority(faces, seen.numpy())
 
 
 def majority(faces: np.ndarray, flags: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.seen import Cameras
 from splitnerf.training.start import HELD_UNTIL, StartShape
 
-FORMAT = 1
+FORMAT = 2
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
 CACHED_LIGHT = {"sky", "aims", "sent", "emitters"}
@@ -42,7 +42,6 @@ def save(training: Any) -> None:
         torch_generator=torch.get_rng_state(),
         occupancy=t.grid.values,
         cells=t.grid.cells,
-        light_noise=t.model.light.loss_samples.state(),
         box_from_world=torch.from_numpy(t.dataset.box_from_world),
         start=None if start is None else start.state(),
         cameras=Cameras.of(t.dataset)._asdict(),
@@ -65,7 +64,6 @@ def restore(training: Any) -> None:
     restore_optimiser(t.optimiser, content, path)
     restore_generator(t.generator, content, path)
     t.grid.values, t.grid.cells = restored_grid(t.grid, content, path)
-    t.model.light.loss_samples.restore(content["light_noise"].tolist())
     t.step, t.seconds, t.n_rays, t.previewed_at = (content[x] for x in ("step", "seconds", "n_rays", "previewed_at"))
     t.log.psnr = content["psnr_mean"]
     # A run that was stopped for its export goes on with the export's refinement; one that has it trains on.
@@ -243,7 +241,6 @@ def _check_cameras(cameras: object) -> None:
 
 def _check_light(config: Config, content: dict) -> None:
     """Raises ValueError where the cached light, stored in addition to the parameters, does not fit the settings."""
-    check_tensor("light_noise", content.get("light_noise"), (2,), torch.float64)
     height, cached = config.constants.occlusion_environment_height, content.get("occlusion_light")
     if content.get("environment") is not None:
         check_tensor("environment", content["environment"], (height, 2 * height, 3), torch.float32)

@@ -158,16 +158,13 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
 
     Half of the queries have rho = 1, the others a uniform rho in [0, 1]. Broad lobes share one set of light directions:
     a rotated lattice or, as published, random directions (``light_set``). A lobe below the roughness
-    ``light_lobe_below`` samples its own directions from its density. The gradient flows into both sides. With
-    ``light_noise`` the set consists of two halves; the difference of their two integrals decides the size of the set in later steps.
+    ``light_lobe_below`` samples its own directions from its density. The gradient flows into both sides.
 
-    Source: SplitNeRF Eq. (11); the size of the set is our addition.
+    Source: SplitNeRF Eq. (11); the lobes' own directions are our addition.
     """
-    c, n_sets = config.constants, 2 if config.constants.light_noise > 0 else 1
-    n = light.loss_samples.count(c.light_noise, c.light_samples) if n_sets == 2 else c.light_samples
-    draw = {"generator": generator, "device": generator.device}
+    c, draw = config.constants, {"generator": generator, "device": generator.device}
     queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
-    directions = torch.cat([light_directions(config, n // n_sets, queries, generator) for _ in range(n_sets)])
+    directions = light_directions(config, queries, generator)
     roughness = torch.ones_like(queries[:, :1])
     roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
     n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
@@ -175,20 +172,16 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     queried = torch.cat([directions, own, queries])
     g = light(queried, torch.cat([roughness.new_zeros(len(directions) + len(own), 1), roughness]))
     shared, lobes, prefiltered = g.split([len(directions), len(own), len(queries)])
-    parts = zip(directions.chunk(n_sets), shared.chunk(n_sets))
-    wide = queries[n_narrow:], roughness[n_narrow:]
-    sums = torch.stack([prefilter_light(*wide, light_dirs=w, light=sent) for w, sent in parts])
-    error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums.mean(0)])
-    if n_sets == 2:
-        noise = ((sums[0] - sums[1]) / 2).square().sum().item()
-        light.loss_samples.learn(noise, error[n_narrow:].square().sum().item(), n)
+    sums = prefilter_light(queries[n_narrow:], roughness[n_narrow:], light_dirs=directions, light=shared)
+    error = prefiltered - torch.cat([lobes.view(n_narrow, c.light_lobe_samples, 3).mean(1), sums])
     if c.light_form == "square":
         return error.square().sum(-1).mean()
     return F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none").sum(-1).mean()
 
 
-def light_directions(config: Config, n: int, queries: Tensor, generator: torch.Generator) -> Tensor:
-    """The n directions [n, 3] that the light loss integrates over, with ``uniform_and_queries`` more."""
+def light_directions(config: Config, queries: Tensor, generator: torch.Generator) -> Tensor:
+    """The directions [n, 3] that the light loss integrates over: ``light_samples``, with ``uniform_and_queries`` more."""
+    n = config.constants.light_samples
     if config.constants.light_set == "fibonacci":
         return fibonacci_directions(n, generator)
     uniform = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
@@ -286,8 +279,8 @@ def occlusion_loss(
 ) -> Tensor:
     """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
 
-    Rays start at the samples, moved on to the surface, and are traced on the CPU; a GPU waits for them. Without
-    ``occlusion.directional`` the specular lobe's axis is the normal, as published.
+    Rays start at the samples, moved on to the surface, and are traced on the CPU; a GPU waits for them. The specular
+    lobe's axis is the normal.
 
     Source: SplitNeRF Eq. (12)-(16).
     """
@@ -302,7 +295,7 @@ def occlusion_loss(
             scene,
             ray.positions[chosen] - normals * ray.sdf[chosen, None],
             normals,
-            lobe_dirs=ray.points.lobe_dirs[chosen] if c.occlusion.directional else normals,
+            lobe_dirs=normals,
             roughness=ray.points.roughness[chosen],
             environment=environment,
             n_diffuse_rays=n_rays,

@@ -33,7 +33,6 @@ SWITCHES: dict[str, dict[str, object]] = {
     "light by the split sum": SPLIT,
     "summed light": SUMMED,
     "split sum, occlusion by MLP": BY_MLP,
-    "split sum, occlusion by MLP, of position alone": BY_MLP | {"occlusion.directional": False},
     "split sum, occlusion averaged over channels": SPLIT | {"occlusion.channels": 1},
     "split sum, no occlusion": SPLIT | {"occlusion.kind": "off"},
     "split sum, Fresnel as in the paper": SPLIT | {"shading.fresnel": "paper"},
@@ -54,8 +53,7 @@ SWITCHES: dict[str, dict[str, object]] = {
 # The references of rows that differ from the full method in more settings than the one that they are named after.
 REFERENCES = {
     "split sum, occlusion by MLP, no occlusion loss": "split sum, occlusion by MLP",
-    "split sum, occlusion by MLP, of position alone": "split sum, occlusion by MLP",
-    **{name: "light by the split sum" for name in SWITCHES if name.startswith("split sum, ") and "MLP, of" not in name},
+    **{name: "light by the split sum" for name in SWITCHES if name.startswith("split sum, ")},
 }
 
 

@@ -63,14 +63,21 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
     """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
 
     Raises:
-        InputError: A photo has no mask, or one of another size.
+        InputError: A photo has no mask, one of another size, or one that may be another's, too.
     """
-    stems = {path.stem: path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith("._")}
-    found = {}
+    found, stems = {}, {}
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and not path.name.startswith("._"):
+            other = stems.setdefault(path.stem, path)
+            if other != path and any(path.stem in (photo.path.name, photo.path.stem) for photo in photos):
+                raise InputError(f"{path}: may be a mask of the same photo as {other.name}; delete one of them")
     for photo in photos:
         path = stems.get(photo.path.name, stems.get(photo.path.stem))
         if path is None:
             raise InputError(f"{folder}: has no mask {photo.path.stem}.png; add it or leave --masks out")
+        if path in found.values():
+            other = next(name for name, mask in found.items() if mask == path)
+            raise InputError(f"{path}: may be the mask of {other} or of {photo.name}; call it {photo.path.name}.png")
         height, width, *_ = read_header(path)
         if (width, height) != (photo.width, photo.height):
             raise InputError(f"{path}: is {width}x{height}, its photo {photo.width}x{photo.height}; make them equal")

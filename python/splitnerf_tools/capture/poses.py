@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import sqlite3
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 from splitnerf.data.layouts.frame import OPENCV_AXES
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note
 
 from splitnerf_tools.capture.photographs import Photograph
 
@@ -125,6 +126,9 @@ def reconstruct(
         InputError: Fewer than three photos fit together.
     """
     database = folder / "features.db"
+    if database.exists() and not _is_sound(database):
+        note(f"{database}: is damaged; the photos' features are searched for again")
+        database.unlink()
     extraction, pipeline = pycolmap.FeatureExtractionOptions(), pycolmap.IncrementalPipelineOptions()
     extraction.max_image_size, extraction.sift.max_num_features = LONGEST, MOST_FEATURES
     reader = pycolmap.ImageReaderOptions()
@@ -235,6 +239,15 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         log.minloglevel, log.alsologtostderr = before
+
+
+def _is_sound(database: Path) -> bool:
+    """Whether a file is a database of SQLite that can be read."""
+    try:
+        with closing(sqlite3.connect(database)) as base:
+            return base.execute("PRAGMA quick_check").fetchone() == ("ok",)
+    except sqlite3.DatabaseError:
+        return False
 
 
 @contextmanager

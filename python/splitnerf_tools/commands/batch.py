@@ -124,10 +124,8 @@ def given_options(args: argparse.Namespace) -> list[str]:
     words = []
     for action in training_options()._actions:
         value = getattr(args, action.dest)
-        if action.help == argparse.SUPPRESS or value == action.default:  # the former is another name of an option
-            continue
-        if isinstance(action, argparse._StoreTrueAction):
+        if value != action.default and isinstance(action, argparse._StoreTrueAction):
             words.append(action.option_strings[0])
-        else:
+        elif value != action.default:
             words += [f"{action.option_strings[0]}={part}" for part in (value if isinstance(value, list) else [value])]
     return words

@@ -12,6 +12,7 @@ from splitnerf.errors import InputError, note
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MANY_NODES = 20000  # seconds of work, more or less
+BYTES_OF_CORNER = 150  # that a corner of a triangle takes where the file has no normals
 
 
 @dataclass
@@ -164,6 +165,7 @@ def _read_part(document: Document, label: str, primitive: dict, placement: np.nd
     if len(triangles) == 0:
         return None
     if "NORMAL" not in arrays:  # then glTF prescribes flat shading and ignores the file's tangents
+        document.spend(triangles.size, BYTES_OF_CORNER)
         arrays = {name: values[triangles.reshape(-1)] for name, values in arrays.items() if name != "TANGENT"}
         placement = placement if len(placement) == 1 else placement[triangles.reshape(-1)]
         triangles = np.arange(triangles.size).reshape(-1, 3)

@@ -20,7 +20,7 @@ from typing import BinaryIO
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, listed_image
+from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, forms, listed_image
 from splitnerf.data.lens import MODELS, PARAMETERS, read_lens
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import is_file
@@ -59,7 +59,8 @@ def read(root: Path, split: None = None) -> list[Frame]:
             lenses[camera] = read_lens(cameras[camera], f"{cameras_file}: camera {camera}")
         image = listed_image(root / IMAGES, name, source)
         pose = checked_pose(_camera_to_world(motion), f"{source}: the pose of {name!r}")
-        candidates = (root / MASKS / f"{name}.png", (root / MASKS / name).with_suffix(".png"))
+        masks = [root / MASKS / form for form in forms(name)]
+        candidates = (path for mask in masks for path in (mask.with_name(f"{mask.name}.png"), mask.with_suffix(".png")))
         mask = next((path for path in candidates if is_file(path)), None)
         frames.append(Frame(os.path.splitext(name)[0], image, pose, *lenses[camera], mask))
     if not frames:

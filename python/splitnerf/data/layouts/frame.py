@@ -89,7 +89,7 @@ def folder_name(name: object, what: str) -> str:
 def listed_file(folder: Path, name: str, source: Path) -> Path:
     """The path of a file that `source` lists relative to `folder`, in Windows' form or another Unicode form perhaps; notes once
     where it leads out of the folder."""
-    path = next((folder / form for form in _forms(name) if is_file(folder / form)), folder / name)
+    path = next((folder / form for form in forms(name) if is_file(folder / form)), folder / name)
     if not os.path.abspath(path).startswith(os.path.join(os.path.abspath(folder), "")):
         note_once(f"{source}: names files outside of its folder; they are read", f"{name!r} is one")
     return path
@@ -100,7 +100,7 @@ def listed_image(folder: Path, name: str, source: Path) -> Path:
     no such regular file."""
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
     for suffix in ("", *suffixes):
-        if any(is_file(folder / form) for form in _forms(f"{name}{suffix}")):
+        if any(is_file(folder / form) for form in forms(f"{name}{suffix}")):
             return listed_file(folder, f"{name}{suffix}", source)
     raise InputError(
         f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "
@@ -108,7 +108,7 @@ def listed_image(folder: Path, name: str, source: Path) -> Path:
     )
 
 
-def _forms(name: str) -> list[str]:
+def forms(name: str) -> list[str]:
     """A name as it is, with slashes for backslashes, and in the forms in which file systems keep letters with accents."""
     slashes = name.replace("\\", "/")
     return list(dict.fromkeys([name, slashes, normalize("NFC", slashes), normalize("NFD", slashes)]))
