@@ -15,25 +15,47 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = Path("python/splitnerf")
-# The fast tests of each file, by the longest beginning of its path that is listed.
+PACKAGES = Path("python")
+# The fast tests of each file, by the longest beginning of its path below python/ or python/splitnerf/ that is listed.
 TESTS = {
     "config/": "test_config.py",
+    "data/": "test_data.py test_layouts.py test_inputs.py test_known_pixels.py test_images.py test_photos.py test_pixels.py",
+    "data/gltf/": "test_gltf.py",
     "devices.py": "test_device.py test_doctor.py test_meshes.py test_train.py",
     "evaluate/": "test_evaluate.py test_metrics.py",
+    "evaluate/published/": "test_published.py test_published_protocols.py test_published_refusals.py",
     "export/": "test_export.py test_bake.py test_meshing.py",
+    "files.py": "test_files.py test_own_files.py",
     "fields/": "test_heads.py test_scene.py test_shading_model.py",
     "fields/light.py": "test_light_parts.py test_light_pyramid.py test_light_mlp.py test_shading_model.py test_scene.py",
     "fields/surface.py": "test_sdf_field.py test_scene.py test_views.py",
     "fields/occlusion.py": "test_heads.py test_visibility_parts.py test_visibility.py test_summed_light.py test_correction.py",
+    "pipeline.py": "test_refined_run.py test_own_files.py test_train.py",
+    "refinement/": "test_refinement.py test_refinement_steps.py test_held_out.py test_level.py test_outline.py test_refined_run.py",
+    "refinement/detail.py": "test_detail.py",
+    "relight/": "test_relight.py test_studio.py",
+    "run_folder.py": "test_own_files.py test_refined_run.py",
+    "splitnerf_tools/ablate/": "test_ablate.py",
+    "splitnerf_tools/batch/": "test_many_scenes.py",
+    "splitnerf_tools/capture/": "test_capture.py test_turntable.py",
+    "splitnerf_tools/doctor/": "test_doctor.py",
+    "splitnerf_tools/inspection/": "test_inspect.py",
+    "splitnerf_tools/report/": "test_report.py test_report_page.py",
+    "splitnerf_tools/separation/": "test_separation.py",
+    "splitnerf_tools/synth/": "test_synth.py",
+    "splitnerf_tools/view/": "test_view.py test_live.py",
     "render/": "test_views.py test_scene.py test_shading_model.py test_correction.py",
     "render/model.py": "test_views.py test_correction.py test_shading_model.py test_scene.py test_summed_light.py test_schedule.py",
     "render/path_traced.py": "test_path_traced.py",
     "render/rays.py": "test_pixels.py",
+    "render/seen.py": "test_meshing.py test_detail.py",
+    "render/stereo.py": "test_start.py",
     "training/checkpoint.py": "test_checkpoint.py",
     "training/finite.py": "test_finite.py",
     "training/gpu_step.py": "test_graph_rules.py test_graphs.py test_finite.py",
     "training/batches.py": "test_pixels.py",
+    "training/exposure.py": "test_exposures.py",
+    "training/start.py": "test_start.py",
     "training/loop.py": "test_refreshes.py test_schedule.py test_finite.py",
     "training/losses.py": "test_light_loss.py test_loss_terms.py test_physics.py test_shading_model.py test_scene.py",
     "training/meshes.py": "test_meshes.py",
@@ -61,7 +83,7 @@ filters.operators-filter.exclude-operators = {left_out}
 
 def tests_of(path: Path) -> list[str]:
     """The test files that concern a source file."""
-    name = path.relative_to(PACKAGE).as_posix()
+    name = path.relative_to(PACKAGES).as_posix().removeprefix("splitnerf/")
     known = [start for start in TESTS if name.startswith(start)]
     if not known:
         sys.exit(f"{path}: no tests are listed for it in {Path(__file__).name}; add a line to TESTS")

@@ -15,7 +15,7 @@ from tiny_runs import SMALL, as_options
 
 def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) -> Score:
     maps = {"albedo": {"psnr": 20.0}, "normal_mae_deg": 5.0, "roughness_mae": 0.1, "metallic_balanced_accuracy": None}
-    views = {"relight": relight and {"psnr": relight}, "novel_view": {"psnr": novel_view}}
+    views = {"relight": relight and {"psnr": relight, "ssim": 0.91, "lpips": None}, "novel_view": {"psnr": novel_view}}
     evaluation = maps | views | {"light_psnr": 15.0, "seconds": 360.0}
     return score_of("scene", row, FULL, seed, evaluation)
 
@@ -100,8 +100,21 @@ def test_tables_hold_what_is_known():
     assert rows[0]["relight"] == "30.0" and rows[1]["relight"] == "" and rows[0]["metallic"] == ""
     assert rows[0]["minutes"] == "6.0" and rows[0]["normals"] == "5.0" and rows[0]["reference"] == FULL
     text = markdown_table([score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0)])
-    assert "| full | 30.50 | 20.00 | 30.00 | 5.00 | 0.100 | - | 15.00 | 6.0 | 2 |" in text and "| b | 29.00 |" in text
-    assert "| -1.00 dB | full |" in text
+    assert (
+        "| full | 30.50 | 0.9100 | 20.00 | 30.00 | 5.00 | 0.100 | 15.00 | 6.0 | 2 |" in text and "| b | 29.00 |" in text
+    )
+    assert "| -1.00 dB | full |" in text and "LPIPS" not in text and "Mean" not in text
+
+
+def test_the_mean_over_scenes_is_that_of_rows_and_scores_that_all_have():
+    """Two seeds of one scene count as one."""
+    here = [score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0), score("c", 0, 28.0)]
+    there = [dataclasses.replace(s, scene="other") for s in (score(FULL, 0, 32.0), score("b", 0, None))]
+    *_, mean = markdown_table([*here, *there]).split("## ")
+    lines = mean.splitlines()
+    assert lines[0] == "Mean over the scenes" and len(lines) == 6
+    assert lines[4].startswith("| full | 31.25 | 0.9100 | 20.00 | 30.00 |")
+    assert lines[5].startswith("| b | - | - | 20.00 | 30.00 |") and lines[5].endswith("| 1 | no difference | full |")
 
 
 def test_it_runs_and_goes_on(data, tmp_path, capsys):

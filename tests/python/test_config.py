@@ -51,7 +51,9 @@ PRINTED = dict(
 RELEASED = dict(
     surface=dict(normals="finite_difference"),
     sampling=dict(occupancy="average", max_rays=8192, target_samples=262144, grid_resolution=128),
-    constants=dict(min_step=math.sqrt(3) * 3 / 1024, light_queries=8129, learning_rate=0.01, final_learning_rate=0.1),
+    mesh=dict(resolution=512),
+    constants=dict(min_step=math.sqrt(3) * 3 / 1024, light_queries=8129, learning_rate=0.01, final_learning_rate=0.1)
+    | dict(box=1.5, sphere_radius=0.5, initial_variance=0.3, initial_rays=256, occlusion_rays=64),
 )
 
 

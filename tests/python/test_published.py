@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -192,6 +194,34 @@ def complete(layout: str, scene) -> None:
         shutil.copytree(root / "test_000", root / "val_000")
         for old, new in ((0, 49), (1, 199)):
             (root / f"test_{old:03d}").rename(root / f"test_{new:03d}")
+
+
+def tinted(path: Path, tint: tuple[float, float, float]) -> Path:
+    """A GLB file with all colours of its materials times a tint."""
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    content, rest = json.loads(data[20 : 20 + length]), data[20 + length :]
+    for material in content["materials"]:
+        pbr = material["pbrMetallicRoughness"]
+        pbr["baseColorFactor"] = [*np.multiply(pbr["baseColorFactor"][:3], tint), 1.0]
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    out = path.with_name("tinted.glb")
+    out.write_bytes(struct.pack("<4s4I", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+    return out
+
+
+@pytest.mark.parametrize("layout", ["nerfactor", "tensoir"])
+def test_albedos_and_relit_views_are_scored_after_the_albedos_factors(layout, tmp_path):
+    """Of the truth in other colours, as of a reconstruction whose light is that much off."""
+    scene = write_set(tmp_path / "s", layout, relights=True)
+    complete(layout, scene)
+    asset = tinted(next((tmp_path / "s").rglob("asset.glb")), (0.5, 0.8, 1.1))
+    options = ["--data", str(scene.root), "--protocol", layout, "--env", str(scene.root / "light.hdr"), "--spp", "96"]
+    assert main(["evaluate", str(asset), *options, "--out", str(tmp_path / "scores.json")]) == DONE
+    scores = json.loads((tmp_path / "scores.json").read_text())["scores"]
+    for key in ("psnr", "albedo_psnr"):
+        assert scores[key] > BEST[layout][key], (key, scores)
 
 
 @pytest.mark.parametrize("layout", BEST)

@@ -12,8 +12,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# The paper's settings, where it states them, and ours where it does not: tests/python/test_config.py names each number's
-# source. Shares of the run stand for 20,000 steps.
+# The paper's settings, or those of its released code, where they state them, and ours where they do not:
+# tests/python/test_config.py names the source of those that are theirs. Shares of the run stand for 20,000 steps.
 PAPER = dict(
     run=dict(preset="paper", steps=20000),
     surface=dict(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +14,15 @@ from splitnerf_tools.ablate.rows import FULL
 CLOSE = 0.3  # dB: a smaller difference of single runs is not significant
 # Name, title, format, and keys in evaluation.json.
 COLUMNS = (
-    ("relight", "relight, dB", "{:.2f}", ("relight", "psnr")),
-    ("albedo", "albedo, dB", "{:.2f}", ("albedo", "psnr")),
-    ("novel_view", "novel view, dB", "{:.2f}", ("novel_view", "psnr")),
+    *(
+        (name + end, f"{title}, {unit}", text, (name, measure))
+        for name, title in (("relight", "relight"), ("albedo", "albedo"), ("novel_view", "novel view"))
+        for end, unit, text, measure in (
+            ("", "dB", "{:.2f}", "psnr"),
+            ("_ssim", "SSIM", "{:.4f}", "ssim"),
+            ("_lpips", "LPIPS", "{:.4f}", "lpips"),
+        )
+    ),
     ("normals", "normals, degrees", "{:.2f}", ("normal_mae_deg",)),
     ("roughness", "roughness, error", "{:.3f}", ("roughness_mae",)),
     ("metallic", "metallic, accuracy", "{:.3f}", ("metallic_balanced_accuracy",)),
@@ -80,15 +86,17 @@ def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
     found = []
     for name in dict.fromkeys(s.row for s in here if s.row != FULL):
         runs = [s for s in here if s.row == name and (s.reference, s.seed) in by_run]
-        gaps = [_judged(s) - _judged(by_run[s.reference, s.seed]) for s in runs]
+        gaps = [_gap(s, by_run[s.reference, s.seed]) for s in runs]
         if gaps:
             error = float(np.std(gaps, ddof=1) / np.sqrt(len(gaps))) if len(gaps) > 1 else None
             found.append(Difference(name, float(np.mean(gaps)), error))
     return found
 
 
-def _judged(score: Score) -> float:
-    return score.values["novel_view"] if score.values["relight"] is None else score.values["relight"]
+def _gap(score: Score, reference: Score) -> float:
+    """By how many dB one run is better than another, over relit views or, where one has none, novel views."""
+    key = "novel_view" if None in (score.values["relight"], reference.values["relight"]) else "relight"
+    return score.values[key] - reference.values[key]
 
 
 def csv_table(scores: Sequence[Score]) -> str:
@@ -102,22 +110,38 @@ def csv_table(scores: Sequence[Score]) -> str:
 
 
 def markdown_table(scores: Sequence[Score]) -> str:
-    """A table per scene, means over the seeds of a row, and the difference to the row's reference."""
-    parts = []
-    for scene in dict.fromkeys(s.scene for s in scores):
-        verdicts = {d.row: d.verdict() for d in differences(scores, scene)}
-        lines = [["", *(title for _, title, *_ in COLUMNS), "seeds", "difference", "to"]]
-        lines.append(["---"] + ["---:"] * (len(COLUMNS) + 2) + ["---"])
-        for name in dict.fromkeys(s.row for s in scores if s.scene == scene):
-            runs = [s for s in scores if s.scene == scene and s.row == name]
-            cells = [_mean([s.values[key] for s in runs], text) for key, _, text, _ in COLUMNS]
-            lines.append(
-                [name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference]
-            )
-        parts.append(f"## {scene}\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines))
-    return "\n".join(parts)
+    """A table per scene, means over the seeds of a row, and the difference to the row's reference; then, of several scenes,
+    the mean over them. Scores that no run has are left out."""
+    scenes = list(dict.fromkeys(s.scene for s in scores))
+    tables = [_table(scene, [s for s in scores if s.scene == scene]) for scene in scenes]
+    if len(scenes) > 1:
+        tables.append(_table("Mean over the scenes", list(_over_scenes(scores, scenes))))
+    return "\n".join(tables)
 
 
-def _mean(values: Sequence[float | None], text: str) -> str:
+def _over_scenes(scores: Sequence[Score], scenes: Sequence[str]) -> Iterator[Score]:
+    """The means of the rows that all scenes have, over the scenes' means over seeds; None where a scene does not know a score."""
+    for name in dict.fromkeys(s.row for s in scores):
+        runs = [[s for s in scores if s.scene == scene and s.row == name] for scene in scenes]
+        if all(runs):
+            means = {key: [_mean([s.values[key] for s in own]) for own in runs] for key, *_ in COLUMNS}
+            values = {key: None if None in known else sum(known) / len(known) for key, known in means.items()}
+            yield Score("", name, 0, values, runs[0][0].reference)
+
+
+def _table(title: str, scores: Sequence[Score]) -> str:
+    verdicts = {d.row: d.verdict() for d in differences(scores, scores[0].scene)}
+    columns = [column for column in COLUMNS if any(s.values[column[0]] is not None for s in scores)]
+    lines = [["", *(heading for _, heading, *_ in columns), "seeds", "difference", "to"]]
+    lines.append(["---"] + ["---:"] * (len(columns) + 2) + ["---"])
+    for name in dict.fromkeys(s.row for s in scores):
+        runs = [s for s in scores if s.row == name]
+        means = ((_mean([s.values[key] for s in runs]), text) for key, _, text, _ in columns)
+        cells = ["-" if mean is None else text.format(mean) for mean, text in means]
+        lines.append([name, *cells, str(len(runs)), verdicts.get(name, ""), "" if name == FULL else runs[0].reference])
+    return f"## {title}\n\n" + "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
-    return text.format(sum(known) / len(known)) if known else "-"
+    return sum(known) / len(known) if known else None

@@ -35,6 +35,10 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
     parser.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
     parser.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
+    parser.add_argument(
+        "--lights", choices=["low", "high"], help="a published relighting protocol, 20 views; see evaluate"
+    )
+    parser.add_argument("--maps", type=Path, metavar="FOLDER", help="folder of maps that DATA has relit images of")
     parser.add_argument("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows"
@@ -81,9 +85,8 @@ def run(args: argparse.Namespace) -> int:
             with atomic_path(args.out / name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
-    plan = AblationPlan(
-        list(scenes.values()), rows, args.seeds, Protocol(args.downscale, args.views, args.spp), args.out
-    )
+    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps)
+    plan = AblationPlan(list(scenes.values()), rows, args.seeds, protocol, args.out)
     refuse_data(args.out)
     try:
         with locked(args.out):
