@@ -221,6 +221,14 @@ def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
         mask_files(photos[:1], tmp_path)
 
 
+def test_photos_without_detail_are_told_of(tmp_path, capsys):
+    (tmp_path / "photos").mkdir()
+    for i in range(5):
+        Image.new("RGB", (200, 150), (100 + i, 120, 140)).save(tmp_path / f"photos/{i}.png")
+    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "data")]) == BAD_INPUT
+    assert "photos: the photos show too little detail; put the object on a pattern" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])
 def test_a_damaged_database_of_features_is_known(tmp_path, damage):
     path = tmp_path / "features.db"

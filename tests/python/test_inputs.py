@@ -211,6 +211,7 @@ def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
     expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
     assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
     assert ("state the gamma" in capsys.readouterr().err) == (exponent is not None)
+    assert read_upright(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)  # as `prepare` reads it
 
 
 def test_an_orientation_is_said(tmp_path, capsys):
@@ -228,6 +229,19 @@ def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, exposures):
     lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode()
     (tmp_path / "x.hdr").write_bytes(whole.replace(b"FORMAT=", lines + b"FORMAT=", 1))
     assert read_radiance(tmp_path / "x.hdr") == pytest.approx(0.5 / np.prod(exposures), rel=0.01)
+
+
+@pytest.mark.parametrize("order", ["-Y 8 +X 16", "+Y 8 +X 16", "-Y 8 -X 16", "+Y 8 -X 16", "+X 8 -Y 16"])
+def test_a_radiance_file_may_begin_at_any_corner(tmp_path, order):
+    image = np.arange(8 * 16, dtype=np.float32).reshape(8, 16, 1).repeat(3, 2) + 1
+    flips = slice(None, None, -1 if "+Y" in order else 1), slice(None, None, -1 if "-X" in order else 1)
+    write_image(tmp_path / "x.hdr", image[flips])
+    (tmp_path / "x.hdr").write_bytes((tmp_path / "x.hdr").read_bytes().replace(b"-Y 8 +X 16", order.encode()))
+    if order.startswith("+X"):
+        with pytest.raises(InputError, match="x.hdr: is stored by columns; re-export it"):
+            read_radiance(tmp_path / "x.hdr")
+    else:
+        np.testing.assert_allclose(read_radiance(tmp_path / "x.hdr"), image, rtol=0.01)
 
 
 def test_grey_photos_of_sixteen_bits_keep_their_values(tmp_path):

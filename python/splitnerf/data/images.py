@@ -58,8 +58,9 @@ def read_colours(path: str | os.PathLike) -> np.ndarray:
     path = Path(path)
     with _opened(path, str(path)) as (source, spec):
         stated = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+        is_turned = stated.get("Orientation", 1) != 1 and source.format_name() != "hdr"
     pixels = read_codes(path)
-    if stated.get("Orientation", 1) != 1:
+    if is_turned:
         turned = f"{path.name}: {stated['Orientation']}"
         note_once(f"{path.parent}: photos state an EXIF orientation; their pixels are used as they are stored", turned)
     if pixels.dtype.kind == "f":
@@ -68,12 +69,21 @@ def read_colours(path: str | os.PathLike) -> np.ndarray:
     if "ICCProfile" in stated:
         profile = bytes(np.asarray(stated["ICCProfile"], np.uint8))
         pixels[..., :n_colours] = from_profile(pixels[..., :n_colours], profile, path)
-    elif (gamma := _stated_gamma(str(stated.get("oiio:ColorSpace", "")))) != 0:
-        most = np.iinfo(pixels.dtype).max
-        curve = linear_to_srgb((np.arange(most + 1, dtype=np.float32) / most) ** np.float32(gamma))
-        pixels[..., :n_colours] = np.rint(most * curve).astype(pixels.dtype)[pixels[..., :n_colours]]
-        note_once(f"{path.parent}: photos state the gamma {gamma:g}; they are brought to sRGB", path.name)
+    else:
+        gamma = _stated_gamma(str(stated.get("oiio:ColorSpace", "")))
+        pixels[..., :n_colours] = from_gamma(pixels[..., :n_colours], gamma, path)
     return pixels
+
+
+def from_gamma(codes: np.ndarray, gamma: float, path: Path) -> np.ndarray:
+    """Stored values, bytes or words of any shape, of a photo that are a power of the light, as sRGB; as they are where its gamma
+    is 0 or about sRGB's."""
+    if gamma == 0 or 2.0 < gamma < 2.4:
+        return codes
+    most = np.iinfo(codes.dtype).max
+    curve = linear_to_srgb((np.arange(most + 1, dtype=np.float32) / most) ** np.float32(gamma))
+    note_once(f"{path.parent}: photos state the gamma {gamma:g}; they are brought to sRGB", path.name)
+    return np.rint(most * curve).astype(codes.dtype)[codes]
 
 
 def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
@@ -98,12 +108,11 @@ def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
 
 
 def _stated_gamma(space: str) -> float:
-    """The gamma of a colour space's name in OpenImageIO's words; 0 for sRGB's curve and those that differ little from it."""
+    """The gamma of a colour space's name in OpenImageIO's words; 0 for another curve."""
     if space.startswith("lin"):
         return 1.0
     found = re.match(r"g(\d+)_", space)
-    gamma = float(found[1]) / 10 if found else 0.0
-    return 0.0 if 2.0 < gamma < 2.4 else gamma
+    return float(found[1]) / 10 if found else 0.0
 
 
 class Header(NamedTuple):
@@ -273,7 +282,7 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
             others = ", ".join(name for i, name in enumerate(spec.channelnames) if i not in kept)
             note_once(f"{path.parent}: channels of images are not used: {others}", path.name)
         top, left, height, width = _window(source, spec)
-        exposure = _exposure(path) if source.format_name() == "hdr" else 1.0
+        exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
         primaries = spec.getattribute("chromaticities")
         if primaries is not None and np.abs(np.asarray(primaries) - REC709).max() > 0.01:
             note_once(
@@ -282,6 +291,7 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
             )
     pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
     pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
+    pixels = pixels[:: order[0], :: order[1]]
     if (top, left, height, width) != (0, 0, *pixels.shape[:2]):
         whole = np.zeros((height, width, pixels.shape[2]), pixels.dtype)
         part = pixels[max(0, -top) :, max(0, -left) :][: max(0, height - max(0, top)), : max(0, width - max(0, left))]
@@ -308,11 +318,16 @@ def _window(source: oiio.ImageInput, spec: oiio.ImageSpec) -> tuple[int, int, in
     return spec.y - spec.full_y, spec.x - spec.full_x, spec.full_height, spec.full_width
 
 
-def _exposure(path: Path) -> float:
-    """The product of the exposures by which a Radiance file says that its values were multiplied."""
+def _radiance_head(path: Path, name: str) -> tuple[float, tuple[int, int]]:
+    """The product of the exposures by which a Radiance file says that its values were multiplied; and 1 or, where they are
+    stored from below or from the right, -1 for its rows and columns. Raises InputError where it is stored by columns."""
     with open(path, "rb") as file:
-        head = file.read(1 << 16).split(b"\n\n", 1)[0]
-    factor = 1.0
+        head, _, size = file.read(1 << 16).partition(b"\n\n")
+    stored = re.match(rb"([+-][XY]) +\d+ +([+-][XY])", size)
+    rows, columns = stored.groups() if stored else (b"-Y", b"+X")
+    if rows.endswith(b"X"):
+        raise InputError(f"{name}: is stored by columns; re-export it")
+    factor, order = 1.0, (-1 if rows == b"+Y" else 1, -1 if columns == b"-X" else 1)
     for line in head.splitlines():
         key, _, value = line.partition(b"=")
         if key.strip() == b"EXPOSURE":
@@ -322,8 +337,8 @@ def _exposure(path: Path) -> float:
             note_once(f"{path.parent}: the {key.strip().decode()} of maps are not used", path.name)
     if not 1e-6 < factor < 1e6:
         note_once(f"{path.parent}: the EXPOSURE of maps is beyond reason and not used", path.name)
-        return 1.0
-    return factor
+        factor = 1.0
+    return factor, order
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from splitnerf.data.asset import Asset, unit
-from splitnerf.data.dataset import Dataset
+from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.export.bake import nearest_rows, rasterise
@@ -221,7 +221,7 @@ def mean_light(light: np.ndarray, turns: np.ndarray | None) -> Tensor:
     """[h, 2 h, 3] the light, its mean over the photos where it turns with them."""
     if turns is None:
         return torch.from_numpy(light)
-    chosen = turns[np.unique(np.linspace(0, len(turns) - 1, MOST_TURNS).round().astype(int))]
+    chosen = turns[spread(range(len(turns)), MOST_TURNS)]
     return torch.from_numpy(np.mean([turn_environment(light, turn) for turn in chosen], axis=0, dtype=np.float32))
 
 

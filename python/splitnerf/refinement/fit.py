@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.data.asset import Asset
-from splitnerf.data.dataset import Dataset
+from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
@@ -453,7 +453,7 @@ def groups_of(turns: np.ndarray, view: np.ndarray) -> list[np.ndarray]:
         turns: [views, 3, 3] rotations.
         view: [n] the pixels' photos.
     """
-    middles = turns[np.unique(np.linspace(0, len(turns) - 1, MOST_GROUPS).round().astype(int))]
+    middles = turns[spread(range(len(turns)), MOST_GROUPS)]
     for _ in range(GROUP_ROUNDS):  # k-means of rotations
         group = np.einsum("vij,kij->vk", turns, middles).argmax(axis=1)
         sums = [turns[group == k].sum(axis=0) for k in np.unique(group)]

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from splitnerf.data.asset import unit
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene, visibility_bits
@@ -98,11 +99,6 @@ def brightest_lobe(light: np.ndarray) -> Lobe:
 def degrees_from(directions: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """[...] angles in degrees between directions [..., 3] and one [3]."""
     return np.degrees(np.arccos(np.clip(directions @ middle, -1, 1)))
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """[..., 3] at length 1."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)
 
 
 def parts_of_light(light: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

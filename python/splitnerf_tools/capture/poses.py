@@ -31,6 +31,7 @@ while True:
     time.sleep(1)
 """  # prints a number a second
 MIN_PHOTOS = 3
+LEAST_DETAIL = 30  # features of a photo, on average, with which it could fit to others
 FEW = 10  # photos up to which points that two of them show are kept
 ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
 # Pixels of reprojection and photos of a point beyond and below which the adjustment drops it.
@@ -162,6 +163,10 @@ def reconstruct(
         )
         model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
         if model is None or model.num_reg_images() < MIN_PHOTOS:
+            if _count_keypoints(database) < LEAST_DETAIL * n:
+                raise InputError(
+                    f"{photos[0].path.parent}: the photos show too little detail; put the object on a pattern"
+                )
             otherwise = "" if moving is not None else ", or give --turntable where it turned before the camera"
             raise InputError(
                 f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
@@ -239,6 +244,12 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         log.minloglevel, log.alsologtostderr = before
+
+
+def _count_keypoints(database: Path) -> int:
+    """The features of all photos together."""
+    with closing(sqlite3.connect(database)) as base:
+        return base.execute("SELECT SUM(rows) FROM keypoints").fetchone()[0] or 0
 
 
 def _is_sound(database: Path) -> bool:

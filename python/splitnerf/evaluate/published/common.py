@@ -12,7 +12,7 @@ from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import MAP_ROWS, read_environment, resize_environment, turn_environment
 from splitnerf.data.images import read_header
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.lens import lens_intrinsics
+from splitnerf.data.lens import check_shape, lens_intrinsics
 from splitnerf.errors import InputError
 from splitnerf.evaluate.lpips import Distance
 from splitnerf.evaluate.protocol import image_scores
@@ -92,6 +92,7 @@ class Delivered:
         """The maps of `AssetRenderer.render` at a frame's camera, smaller than its photo by an integer factor, under a
         light [h, w, 3]; None: any, for maps that do not depend on it."""
         header, pose = read_header(frame.image_path), frame.pose.copy()
+        check_shape(frame.lens, (header.height, header.width), frame.image_path)
         height, width = header.height // factor, header.width // factor
         pose[:3, 3] -= self.origin
         lens = lens_intrinsics(frame.lens, (header.height, header.width)) / factor
