@@ -54,17 +54,6 @@ def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
     assert load_dataset(tmp_path).intrinsics[0, 0] == pytest.approx(2 * FOCAL)
 
 
-def test_the_axes_of_a_frames_own_lens_are_independent(tmp_path):
-    write_transforms(tmp_path, fl_y=3 * FOCAL)
-    path = tmp_path / "transforms.json"
-    content = json.loads(path.read_text())
-    content["frames"][1]["fl_x"] = 2 * FOCAL
-    path.write_text(json.dumps(content))
-    found = {frame.name: frame.lens for frame in read_frames(tmp_path, "train")[0]}
-    changed = [lens for lens in found.values() if lens.get("fl_x") == 2 * FOCAL]
-    assert len(changed) == 1 and all(lens["fl_y"] == 3 * FOCAL for lens in found.values())
-
-
 def test_masks_of_colmap_are_found_by_both_names(tmp_path):
     root = write_colmap(tmp_path, binary=True, masks=True)
     for i in range(0, COUNT, 2):

@@ -24,8 +24,8 @@ def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
 def test_the_sets_of_light_directions():
     queries = F.normalize(torch.randn(5, 3), dim=1)
     for name, count in (("fibonacci", 400), ("uniform", 400), ("uniform_and_queries", 405)):
-        config = Config().replace({"light_set": name})
-        w = losses.light_directions(config, 400, queries, torch.Generator().manual_seed(0))
+        config = Config().replace({"light_set": name, "light_samples": 400})
+        w = losses.light_directions(config, queries, torch.Generator().manual_seed(0))
         assert w.shape == (count, 3) and w.mean(0).norm() < 0.15
         torch.testing.assert_close(w.norm(dim=1), torch.ones(count))
     assert torch.equal(w[400:], queries)

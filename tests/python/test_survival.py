@@ -207,7 +207,6 @@ def test_a_run_in_use_is_refused(data, done, capsys):
             ["export", run],
             ["batch", data, "--out", run],
             ["evaluate", run, "--data", data],
-            ["refine", run, "--data", data, "--out", run],
         ):
             assert command(*words) == BAD_INPUT
             error = capsys.readouterr().err

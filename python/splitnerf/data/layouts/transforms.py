@@ -37,8 +37,7 @@ from splitnerf.files import is_file
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
-FOCAL_OF_AXES = ("camera_angle_x", "fl_x"), ("camera_angle_y", "fl_y")
-FOCAL = tuple(key for keys in FOCAL_OF_AXES for key in keys)
+FOCAL = ("camera_angle_x", "camera_angle_y", "fl_x", "fl_y")
 LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
 SMALLEST_EXPOSURE = 1e-4
 LARGEST_GAMMA = 5.0
@@ -232,8 +231,6 @@ def _read_camera(
         value = given.pop(key)
         if any(value) if isinstance(value, list) else value:
             raise InputError(f"{path}: '{key}' is not read; undistort the photos and leave it out")
-    focal = {}
-    for keys in FOCAL_OF_AXES:
-        own = any(entry.get(key) is not None for key in keys)
-        focal |= {key: (entry if own else meta).get(key) for key in keys}
+    own = any(entry.get(key) is not None for key in FOCAL)
+    focal = {key: (entry if own else meta).get(key) for key in FOCAL}
     return pose, *read_lens(focal | given, str(path))
