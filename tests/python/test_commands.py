@@ -174,19 +174,21 @@ ELSEWHERE = {  # the folder that is given, and what stands in the one line
     "photos": ("photos", "holds photos without cameras; `splitnerf prepare"),
     "a part of data": ("data/train", "is a part of the data set"),
     "data sets": ("", "holds data sets; give one, such as"),
-    "a run": ("run", "is a run; look at it by `splitnerf view"),
+    "a run": ("runs/run", "is a run; look at it by `splitnerf view"),
     "nothing known": ("empty", "has neither transforms_"),
 }
 
 
 @pytest.mark.parametrize("case", ELSEWHERE)
-def test_data_that_are_none_are_named(case, data, tmp_path, capsys):
+def test_data_that_are_none_are_named(case, data, tmp_path, capsys, monkeypatch):
+    """Before it is asked where to write: without --out a run would be its own."""
+    monkeypatch.chdir(tmp_path)
     shutil.copytree(data, tmp_path / "data")
-    for name in ("photos/a.JPG", "run/checkpoint.pt", "empty/notes.txt"):
-        (tmp_path / name).parent.mkdir()
+    for name in ("photos/a.JPG", "runs/run/checkpoint.pt", "empty/notes.txt"):
+        (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).touch()
     folder, said = ELSEWHERE[case]
-    assert main(["train", str(tmp_path / folder), "--out", str(tmp_path / "out")]) == BAD_INPUT
+    assert main(["train", str(tmp_path / folder)]) == BAD_INPUT
     (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
     assert said in line
 

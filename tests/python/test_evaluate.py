@@ -204,6 +204,12 @@ def test_usage_that_makes_no_sense(tmp_path, capsys, arguments, message):
     assert not list(tmp_path.glob("run/*"))
 
 
+def test_a_run_knows_where_its_data_are(done, tmp_path):
+    out = tmp_path / "scores.json"
+    assert main(["evaluate", str(done), "--views", "1", "--spp", "1", "--out", str(out)]) == DONE
+    assert json.loads(out.read_text())["novel_view"]["psnr"] > 5
+
+
 # ---- assets ----
 
 

@@ -246,11 +246,11 @@ def test_progress_is_the_larger_share_of_steps_or_minutes(data, tmp_path, step, 
         assert progress_by(config)(step, float(seconds)) == pytest.approx(min(1.0, max(step / 100, share)))
 
 
-def test_the_bar_shows_the_step_the_error_and_the_samples(tmp_path):
+def test_the_bar_shows_the_step_and_the_error(tmp_path):
     log, numbers = StepLog(tmp_path), StepNumbers(4, 50, {}, {}, 1.0, Capacity(300, 120, 40), 20.0, 162)
-    assert log.text(numbers) == "step 4 3.2 samples/ray"
+    assert log.text(numbers) == "training, step 4"
     log.psnr = 21.456
-    assert log.text(numbers) == "step 4 PSNR 21.46 dB, 3.2 samples/ray"
+    assert log.text(numbers) == "training, step 4, photos 21.46 dB"
 
 
 def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path):

@@ -73,6 +73,12 @@ def test_work_that_may_be_left_out_is_so_after_a_request():
     assert done == [1]
 
 
+def test_an_interruption_before_the_first_checkpoint_says_so(data, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("splitnerf.pipeline.load_splits", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    assert train(data, tmp_path / "run") == INTERRUPTED
+    assert "interrupted before the first checkpoint; the command begins anew" in capsys.readouterr().err
+
+
 def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys, number=signal.SIGTERM):
     """As Ctrl-C does: here while the meshes are exported."""
     monkeypatch.setattr("splitnerf.pipeline.write_assets", lambda *_, **__: signal.raise_signal(number))

@@ -367,7 +367,7 @@ def test_what_cannot_be_shown_is_refused_before_anything_is_served(shown_run, tm
     assert "text.glb: is neither" in refused(capsys, shown_run, tmp_path / "text.glb")
     assert "parts.gltf: is a .gltf" in refused(capsys, tmp_path / "parts.gltf")
     assert "empty: has no mesh.glb" in refused(capsys, tmp_path / "empty")
-    assert "absent.glb: no such file" in refused(capsys, tmp_path / "absent.glb")
+    assert "absent.glb: no such run or .glb file" in refused(capsys, tmp_path / "absent.glb")
     assert "bad.hdr: " in refused(capsys, shown_run, "--light", tmp_path / "bad.hdr")
     assert "absent: no such folder" in refused(capsys, shown_run, "--data", tmp_path / "absent")
     assert "--port must lie between 0 and 65535" in refused(capsys, shown_run, "--port", 70000)

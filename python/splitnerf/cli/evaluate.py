@@ -112,10 +112,14 @@ def check_usage(args: argparse.Namespace) -> None:
     from splitnerf.evaluate.published.scoring import holds_published
     from splitnerf.evaluate.score_table import holds_table
     from splitnerf.evaluate.scoring import holds_evaluation
+    from splitnerf.run_folder import data_of
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
     if not args.data and given:
-        raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
+        known = [data_of(target) if target.is_dir() else None for target in args.targets]
+        if None in known:
+            raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
+        args.data = [data for data, _ in known]
     ruled_out = [name for name in OWN_RULES if getattr(args, name) is not None]
     if args.protocol and (ruled_out or args.downscale is not None):
         name = (ruled_out or ["downscale"])[0].replace("_", "-")

@@ -105,10 +105,13 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.data.frames import layout_of, what_is_in
     from splitnerf.files import locked
 
     if args.resume and args.overwrite:
         raise InputError("--resume and --overwrite exclude each other")
+    if layout_of(args.data) is None and (instead := what_is_in(args.data)):
+        raise InputError(f"{args.data}: {instead}")
     run, settings = args.out or Path("runs") / args.data.resolve().name, settings_of(args)
     with ExitStack() as stack:
         observers = list(map(stack.enter_context, observers_of(args, run)))
@@ -173,16 +176,13 @@ def train_in(
         print(f"{run}: is finished")
         print_scores(read_evaluation(run))
         return DONE
-    trained, evaluation = reconstruct(
-        args.data,
-        run,
-        config,
-        downscale=args.downscale,
-        device=device,
-        resume=resume,
-        overwrite=overwrite,
-        observer=observer,
-    )
+    options = {"downscale": args.downscale, "device": device, "resume": resume, "overwrite": overwrite}
+    try:
+        trained, evaluation = reconstruct(args.data, run, config, observer=observer, **options)
+    except KeyboardInterrupt:
+        if (run / "checkpoint.pt").is_file():
+            raise
+        raise KeyboardInterrupt("interrupted before the first checkpoint; the command begins anew") from None
     if evaluation is None:
         where = "in the refinement" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To continue, repeat the command with --resume.")

@@ -66,9 +66,8 @@ class StepLog:
         return line
 
     def text(self, numbers: StepNumbers) -> str:
-        """The bar's text for a step: its number, the mean PSNR and the samples per ray."""
-        psnr = "" if self.psnr is None else f"PSNR {self.psnr:.2f} dB, "
-        return f"step {numbers.step} {psnr}{numbers.evaluated / numbers.n_rays:.1f} samples/ray"
+        """The bar's text for a step: its number, and how well the photos are explained."""
+        return f"training, step {numbers.step}" + ("" if self.psnr is None else f", photos {self.psnr:.2f} dB")
 
 
 def read_metrics(path: Path) -> list[dict]:

@@ -155,6 +155,8 @@ class ViewedAssets:
         Raises:
             InputError: It cannot be read.
         """
+        if not path.exists():
+            raise InputError(f"{path}: no such run or .glb file")
         glb = path / "mesh.glb" if path.is_dir() else path
         if path.is_dir() and not glb.is_file():
             raise InputError(f"{path}: has no mesh.glb; finish its training, or give a .glb file")
