@@ -12,7 +12,8 @@ from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.export.simplify import capped, decimate, drop_floaters_and_cavities, is_closed, split_pinches
 from splitnerf.export.textured import textured_asset
-from splitnerf.render.seen import GRAZING, Cameras, majority, seen_vertices
+from splitnerf.ops import MeshScene
+from splitnerf.render.seen import GRAZING, Cameras, in_view, majority, seen_vertices
 from test_bake import ball
 
 RADIUS = 0.7
@@ -226,6 +227,17 @@ def test_a_camera_sees_the_cap_of_a_sphere():
     cosine = (to_camera * mesh.vertices).sum(1) / np.linalg.norm(to_camera, axis=1)
     found = seen(mesh, from_above())
     assert found[cosine > GRAZING + 0.03].all() and not found[cosine < GRAZING - 0.03].any()
+
+
+@pytest.mark.parametrize("offset", [1e-3, 0.1])
+def test_a_point_is_seen_where_it_is_however_far_off_its_ray_begins(offset):
+    """At a distance of 2 from the camera and 0.6 from its axis: 100 0.6 / 2 pixels from the middle."""
+    point, (camera,) = torch.tensor([[0.6, 0.0, 1.0]]), zip(*from_above())
+    body = round_body(0.5)
+    scene = MeshScene(np.float32(body.vertices), np.int32(body.faces))
+    found = in_view(scene, point, torch.tensor([[1.0, 0.0, 0.0]]), camera, offset, -1.0)
+    assert found.at.tolist() == [[pytest.approx(80.0), pytest.approx(50.0)]]
+    assert found.distance.item() == pytest.approx(math.hypot(0.6, 2.0)) and found.rows.tolist() == [0]
 
 
 def test_a_photo_shows_what_lies_in_its_frame():

@@ -70,15 +70,15 @@ def in_view(
         least: Cosine of the normal and a line of sight below which the photo does not show the point.
     """
     pose, lens, size = camera
-    starts = points + offset * normals
-    to_camera = pose[:3, 3] - starts
+    to_camera = pose[:3, 3] - points
     distance = to_camera.norm(dim=1)
     cosine = (to_camera * normals).sum(1) / distance
     in_camera = -to_camera @ pose[:3, :3]
     at = projected(in_camera, lens)
     in_frame = (in_camera[:, 2] < 0) & (at > 0).all(1) & (at < size.flip(0)).all(1)
     rows = torch.nonzero(in_frame & (cosine > least))[:, 0]
-    rows = rows[scene.is_open(starts[rows], to_camera[rows], 1.0)]
+    start = offset * normals[rows]  # off the surface: the ray alone, as the photo shows the point itself
+    rows = rows[scene.is_open(points[rows] + start, to_camera[rows] - start, 1.0)]
     return InView(rows, at[rows], cosine[rows], distance[rows])
 
 
