@@ -115,7 +115,9 @@ def main() -> None:
     args = parser.parse_args()
     if len(args.runs) % 2:
         parser.error("give each RUN with its DATA")
-    facts = provenance(("python/splitnerf/refinement",), "python tests/bench/detail.py RUN DATA ...")
+    facts = provenance(
+        ("python/splitnerf/refinement", "python/splitnerf/render/seen.py"), "python tests/bench/detail.py RUN DATA ..."
+    )
     lines, pictures = zip(*(rows_of(*pair, args.averages) for pair in zip(args.runs[::2], args.runs[1::2])))
     image = Image.fromarray((255 * np.concatenate(pictures)).round().astype(np.uint8))
     image.save(args.out / "detail.jpg", quality=85)

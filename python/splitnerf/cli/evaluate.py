@@ -34,7 +34,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         type=Path,
         action="append",
         metavar="DATA",
-        help="the data that RUN was trained on; once for all, or once for each RUN in order",
+        help="the data that RUN was trained on (default, with options that need them: where they were); once, or once for each RUN",
     )
     add("--downscale", type=int, metavar="N", help="average images down by N (default: as in training)")
     add_reading_options(parser, "as in training")
