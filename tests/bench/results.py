@@ -56,7 +56,7 @@ SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     "cpu": (),
     "paper": (
         *("--preset", "paper", "--steps", 20000, "--set", "target_samples=4096", "--set", "light_samples=2048"),
-        *("--set", "light_queries=2048", "--set", "mesh.resolution=192"),
+        *("--set", "light_queries=2048", "--set", "mesh.resolution=192", "--set", "run.preview_every=1"),
     ),
 }
 KEYS = ("scene", "settings", "minutes", "seed", "images", "threads", "asset")
@@ -144,8 +144,8 @@ def rows_of(scene: str, settings: str, minutes: float, seed: int, page: Page, wo
         return []
     run = work / f"runs/{scene.replace(' ', '_')}_{settings}_{minutes:g}_{seed}"
     commit = provenance(SOURCES)["commit"]  # before, as the sources may change meanwhile
-    words = *SETTINGS[settings], "--max-minutes", minutes, "--seed", seed, "--overwrite"
-    if not splitnerf("train", data, "--out", run, *words):
+    limits = ("--max-minutes", minutes, "--overwrite") if minutes else ("--resume", "auto")  # the latter takes hours
+    if not splitnerf("train", data, "--out", run, *SETTINGS[settings], *limits, "--seed", seed):
         return []
     rows, files = [], {"trained": source_of(run) / "mesh.glb", "refined": run}
     if source_of(run) == run:
@@ -163,7 +163,8 @@ def rows_of(scene: str, settings: str, minutes: float, seed: int, page: Page, wo
             os.environ.get("OMP_NUM_THREADS", "all"),
             asset,
         )
-        rows.append(dict(zip(KEYS, key)) | scored(read_json(scores, "novel_view"), commit))
+        found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
+        rows.append(dict(zip(KEYS, key)) | scored(found, commit))
     if page.pictures:
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
         splitnerf("evaluate", run, "--data", data, "--spp", 64, "--views", 1, "--sheet", sheet)
@@ -218,12 +219,17 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         "",
         "| " + " | ".join(shown) + " |",
         "|" + " --- |" * len(shown),
-        *("| " + " | ".join(row[column] or "-" for column in shown) + " |" for row in rows),
+        *("| " + " | ".join(cell(row, column) for column in shown) + " |" for row in rows),
         "",
         *means(rows),
     ]
     with atomic_path(out / f"{name}.md") as temporary:
         temporary.write_text("\n".join(lines))
+
+
+def cell(row: Row, column: str) -> str:
+    """The text of a row's column."""
+    return "all steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
 
 
 def means(rows: list[Row]) -> list[str]:
@@ -233,7 +239,8 @@ def means(rows: list[Row]) -> list[str]:
         chosen = [row for row in rows if row["minutes"] == minutes and row["asset"] == "refined"]
         values = {column: [float(row[column]) for row in chosen if row[column]] for column in list(SCORES)[:3]}
         text = ", ".join(f"{column[:-4]} {sum(v) / len(v):.1f} dB" for column, v in values.items() if v)
-        lines.append(f"Mean of {len(chosen)} runs of {minutes} minutes: {text}.")
+        if chosen:
+            lines.append(f"Mean of {len(chosen)} runs of {minutes} minutes: {text}.")
     return [*lines, ""]
 
 

@@ -73,10 +73,19 @@ def test_work_that_may_be_left_out_is_so_after_a_request():
     assert done == [1]
 
 
-def test_an_interruption_before_the_first_checkpoint_says_so(data, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("splitnerf.pipeline.load_splits", lambda *_, **__: signal.raise_signal(signal.SIGINT))
-    assert train(data, tmp_path / "run") == INTERRUPTED
-    assert "interrupted before the first checkpoint; the command begins anew" in capsys.readouterr().err
+@pytest.mark.parametrize("part", ["splitnerf.pipeline.load_splits", "splitnerf.training.loop.Training.begin"])
+@pytest.mark.parametrize(("words", "more"), [((), ("--overwrite",)), (("--resume", "auto"), ())])
+def test_an_interruption_before_the_first_checkpoint_says_what_to_do(
+    part, words, more, data, tmp_path, monkeypatch, capsys
+):
+    """And that works: before anything stands in the run's folder, and after."""
+    command = (data, tmp_path / "run", "--steps", "4", *words)
+    monkeypatch.setattr(part, lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    assert train(*command) == INTERRUPTED
+    told = "repeat the command" + "".join(f" with {word}" for word in more)
+    assert capsys.readouterr().err.rstrip().endswith(f"interrupted, nothing to continue from; {told}")
+    monkeypatch.undo()
+    assert train(*command, *more) == DONE
 
 
 def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys, number=signal.SIGTERM):

@@ -182,7 +182,8 @@ def train_in(
     except KeyboardInterrupt:
         if (run / "checkpoint.pt").is_file():
             raise
-        raise KeyboardInterrupt("interrupted before the first checkpoint; the command begins anew") from None
+        again = "" if args.resume or args.overwrite else " with --overwrite"
+        raise KeyboardInterrupt(f"interrupted, nothing to continue from; repeat the command{again}") from None
     if evaluation is None:
         where = "in the refinement" if trained.finished else f"at step {trained.step}"
         print(f"stopped {where}; the state is in {run}. To continue, repeat the command with --resume.")

@@ -99,14 +99,12 @@ def read_upright(path: Path) -> np.ndarray:
             raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
         turn, profile = TURNS.get(_exif(image, path).get(ExifTags.Base.Orientation)), image.info.get("icc_profile")
-        stored = image.info.get("gamma", 0.0)  # the exponent of what is stored, of a PNG
+        stored = image.info.get("gamma") or math.inf  # the exponent of what a PNG stores
         upright = image if turn is None else image.transpose(turn)
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
             return np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
         pixels = np.asarray(upright.convert("RGB"))
-    return (
-        from_profile(pixels, profile, path) if profile else from_gamma(pixels, 1 / stored if stored > 0 else 0.0, path)
-    )
+    return from_profile(pixels, profile, path) if profile else from_gamma(pixels, 1 / stored, path)
 
 
 def is_upright(photo: Photograph) -> bool:
