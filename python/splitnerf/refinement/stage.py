@@ -275,27 +275,19 @@ class Stage:
 
     def result(self) -> Refined:
         """The result so far."""
-        fit, chosen = self.fit, self.best if self.last.is_worse(self.best) else self.last
+        fit, size = self.fit, self.albedo_size
+        chosen = self.best if self.last.is_worse(self.best) else self.last
         asset = fit.texels.asset_with(fit.texels.maps(to_values(chosen.unknowns)))
         if not self.normals_show(chosen):
             asset = replace(asset, materials=[replace(asset.materials[0], normal_texture=None)])
         light = radiance_of(chosen.light).numpy()
-        if self.albedo_size is not None:
+        if size is not None:
             left = max(self.minutes_limit - self.seconds, DETAIL_SHARE * self.minutes_limit)
             asset = with_detail(
-                self.dataset, asset, light, self.albedo_size, left, lambda share: self.show(share, "refinement, detail")
+                self.dataset, asset, light, size, left, lambda share: self.show(share, "refinement, detail")
             )
         held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else self.unseen))
         saturated = float(fit.pixels.saturated.mean())
         return Refined(
-            asset,
-            light,
-            self.outline,
-            self.sweeps,
-            held,
-            chosen.number,
-            saturated,
-            self.lamp,
-            fit.level,
-            self.albedo_size,
+            asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level, size
         )
