@@ -227,15 +227,19 @@ def test_observers_learn_of_all_that_happens(data, tmp_path):
     assert resumed.heard[0] == ("begun", 40)
 
 
-def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch):
+def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch, capsys):
     def refused(source, *_, **__):
         assert (source / "mesh.glb").is_file()
         raise InputError("nothing to fit")
 
     monkeypatch.setattr("splitnerf.pipeline.refine_folder", refused)
-    asking = Asking()
-    reconstruct(data, tmp_path / "run", tiny(steps=30, **{"refinement.enabled": True}), observer=asking)
+    asking, run = Asking(), tmp_path / "run"
+    reconstruct(data, run, tiny(steps=30, **{"refinement.enabled": True}), observer=together([asking, Stages()]))
     assert asking.heard[-3:] == [("export", None), ("refinement", True), ("evaluation", True)]
+    said = [line.partition(",")[0] for line in capsys.readouterr().err.splitlines() if line.startswith("stage")]
+    where = f"on {torch.get_num_threads()} threads of the CPU; in all 30 steps; results go to {run}"
+    names = [f"training {where}", "export", "refinement", "evaluation"]
+    assert said == [f"stage {number} of 4: {name}" for number, name in enumerate(names, 1)]
 
 
 def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):

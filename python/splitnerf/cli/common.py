@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import resource
+import sys
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -14,6 +17,7 @@ from splitnerf.errors import plain
 
 if TYPE_CHECKING:
     from splitnerf.data.reading import Reading
+    from splitnerf.training.observer import Event
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 SHELLS = ("bash", "zsh", "tcsh")
@@ -153,12 +157,45 @@ def reading_of(args: argparse.Namespace, target: Path) -> Reading:
     return replace(reading, separated=run / SEPARATED) if run is not None and is_separated(run / SEPARATED) else reading
 
 
+class Stages:
+    """An observer that says which stage of a run begins, what ends it, and where the results go."""
+
+    def __init__(self) -> None:
+        self._names, self._started = ["training"], time.monotonic()
+
+    def __call__(self, event: Event) -> None:
+        if event.kind == "begun":
+            import torch
+
+            training, run = event.training, event.training.config.run
+            refinement = ["refinement"] if training.config.refinement.enabled else []
+            self._names = ["training", "export", *refinement, "evaluation"]
+            where = (
+                "the GPU" if training.model.device.type != "cpu" else f"{torch.get_num_threads()} threads of the CPU"
+            )
+            ends = (
+                f"{run.max_minutes:.3g} minutes, export and scores aside" if run.max_minutes else f"{run.steps} steps"
+            )
+            if not training.finished:
+                self._say("training", f" on {where}; in all {ends}; results go to {training.run}")
+        elif event.kind in self._names:
+            minutes, seconds = divmod(round(time.monotonic() - self._started), 60)
+            self._say(event.kind, f", after {minutes}:{seconds:02d} minutes")
+
+    def _say(self, name: str, more: str) -> None:
+        print(f"stage {self._names.index(name) + 1} of {len(self._names)}: {name}{more}", file=sys.stderr, flush=True)
+
+
 def print_summary(
     run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None, device: str = "cpu"
 ) -> None:
-    """Prints the steps and the device, the errors against the truth in the data, and the path of the results."""
+    """Prints the steps, the device and the memory, the errors against the truth in the data, and the path of the
+    results."""
     if step is not None and seconds is not None:
-        print(f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}")
+        used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1024 if sys.platform == "linux" else 1)
+        print(
+            f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}, {used / 1e9:.1f} GB of memory"
+        )
     print_refinement(evaluation.get("refinement"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")

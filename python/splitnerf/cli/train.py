@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from splitnerf.cli.common import (
     DONE,
     INTERRUPTED,
+    Stages,
     add_reading_options,
     examples,
     print_scores,
@@ -170,7 +171,7 @@ def train_in(
     base = begun or preset(args.preset or ("cpu" if device.type == "cpu" else "fast"))
     if begun and args.preset and not (args.resume == "auto" and args.preset == base.run.preset):
         raise InputError("--preset cannot change in a run that is resumed")
-    config, observer = base.replace(settings), together(observers)
+    config, observer = base.replace(settings), together([Stages(), *observers])
     if args.resume == "auto" and config == base and is_finished(run):
         observer(Event("evaluation", path=run))
         print(f"{run}: is finished")

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from splitnerf.cli.common import DONE, INTERRUPTED, examples, print_summary
+from splitnerf.cli.common import DONE, INTERRUPTED, Stages, examples, print_summary
 from splitnerf.cli.train import budget
 from splitnerf.errors import InputError
 
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         own_folder(data)
         print(f"rendering the demo scene into {data} ...", file=sys.stderr)
         write_demo_dataset(data, seed=args.seed)
-        trained, evaluation = reconstruct(data, args.out, config, overwrite=args.overwrite)
+        trained, evaluation = reconstruct(data, args.out, config, overwrite=args.overwrite, observer=Stages())
     if evaluation is None:
         print(f"stopped; the state is in {args.out}. To continue: splitnerf train {data} --out {args.out} --resume")
         return INTERRUPTED
