@@ -12,7 +12,8 @@ import numpy as np
 import torch
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
-from splitnerf.ops import HashGridSpec, PackedSamples, composite, hash_encode, march_rays
+from splitnerf.ops import HashGridSpec, composite, hash_encode, march_rays
+from splitnerf.ops.rays import PackedSamples
 from splitnerf.render.rays import image_rays
 from splitnerf_tools.demo.scene import write_demo_dataset
 from torch import nn

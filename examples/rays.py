@@ -7,7 +7,8 @@ import sys
 
 import torch
 from splitnerf.data.images import write_image
-from splitnerf.ops import CELL_OCCUPIED, composite, march_rays, surface_weights
+from splitnerf.ops import composite, march_rays, surface_weights
+from splitnerf.ops.rays import CELL_OCCUPIED
 
 SIZE, BOX, RESOLUTION, STEP = 160, 1.5, 64, 0.01
 

@@ -7,7 +7,7 @@ Tests compare the operators with these functions, and benchmarks time both. Each
 import math
 
 import torch
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE
+from splitnerf.ops.rays import CELL_OCCUPIED, CELL_OPAQUE
 from torch import Tensor
 from torch.nn import functional as F
 

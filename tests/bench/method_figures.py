@@ -136,7 +136,9 @@ def lobe() -> plt.Figure:
         rough = torch.tensor([[rho]], dtype=torch.float64)
         one = [x.expand(len(lights), -1).contiguous() for x in (normal, view, rough)]
         ones = torch.ones(len(lights), 1, dtype=torch.float64)
-        values = ops.monte_carlo_light(*one, lights[:, None], ones, ones[..., None].expand(-1, -1, 3)).specular[:, 0]
+        values = ops.shading.monte_carlo_light(*one, lights[:, None], ones, ones[..., None].expand(-1, -1, 3)).specular[
+            :, 0
+        ]
         axis.set_theta_zero_location("N")
         axis.set_theta_direction(-1)
         axis.set_thetalim(-np.pi / 2, np.pi / 2)

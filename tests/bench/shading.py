@@ -6,8 +6,8 @@ from collections.abc import Callable
 import reference
 import torch
 from splitnerf.errors import note
-from splitnerf.ops import brdf_lut, fibonacci_directions, prefilter_light, split_sum_shade
-from splitnerf.ops.shading import SHADED
+from splitnerf.ops import fibonacci_directions, prefilter_light, split_sum_shade
+from splitnerf.ops.shading import SHADED, brdf_lut
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
 from torch import Tensor

@@ -3,15 +3,8 @@
 import numpy as np
 import torch
 from scipy import ndimage
-from splitnerf.ops import (
-    QUERIES,
-    LightSums,
-    light_queries,
-    monte_carlo_light,
-    shade_sums,
-    split_sum_shade,
-    summed_light,
-)
+from splitnerf.ops import light_queries, split_sum_shade
+from splitnerf.ops.shading import QUERIES, LightSums, monte_carlo_light, shade_sums, summed_light
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.prefilter import Truth
 from splitnerf_tools.bench.subjects import MapLight, lights

@@ -11,7 +11,8 @@ from op_checks import generator
 from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import VisibilityBits
-from splitnerf.ops import MeshScene, VisibilityCache
+from splitnerf.ops import MeshScene
+from splitnerf.ops.visibility import VisibilityCache
 from splitnerf.render import model as rendering
 from splitnerf.render.model import SceneModel
 from torch.nn import functional as F
@@ -41,7 +42,7 @@ def bits_of(mesh: trimesh.Trimesh, directions: torch.Tensor, **options: object) 
 
 def refresh(bits: VisibilityBits, light: Callable, materials: Callable, shade: Callable) -> None:
     """A bounce of indirect light as a model computes it, of other materials and shading; for `shade` see
-    :func:`splitnerf.ops.split_sum_shade`."""
+    :func:`splitnerf.ops.shading.split_sum_shade`."""
     scene = SimpleNamespace(config=Config(), bits=bits, cells=SimpleNamespace(turns=None), materials_at=materials)
     scene.device = torch.device("cpu")
     with pytest.MonkeyPatch.context() as patch:

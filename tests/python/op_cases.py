@@ -13,7 +13,9 @@ from op_checks import as_tuple, generator, lib, rand, unit
 from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
 from splitnerf.fields.surface import SdfField
-from splitnerf.ops import CELL_OCCUPIED, HashGridSpec, MeshScene, fibonacci_directions, light_filters, zonal_factors
+from splitnerf.ops import HashGridSpec, MeshScene, fibonacci_directions
+from splitnerf.ops.light import light_filters, zonal_factors
+from splitnerf.ops.rays import CELL_OCCUPIED
 from torch.utils._pytree import tree_map
 
 # ---- the hash grid ----

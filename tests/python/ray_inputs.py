@@ -2,7 +2,7 @@
 
 import torch
 from op_checks import generator, rand, unit
-from splitnerf.ops import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples
+from splitnerf.ops.rays import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples
 
 OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
 

@@ -2,7 +2,7 @@
 
 import torch
 from op_checks import generator, rand, unit
-from splitnerf.ops import brdf_lut
+from splitnerf.ops.shading import brdf_lut
 
 
 def sums_inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:

@@ -6,7 +6,7 @@ import trimesh
 from mesh_shapes import traced
 from op_checks import generator, rand, unit
 from splitnerf.fields.occlusion import bit_counts
-from splitnerf.ops import ShadingSubset
+from splitnerf.ops.rays import ShadingSubset
 from splitnerf.render.model import SUMMED_BAND, SceneModel, ShadedPoints
 from splitnerf.render.occupancy import make_grid
 from splitnerf.render.renderer import MIN_OPACITY, add_corrections, find_samples, render_rays

@@ -10,7 +10,7 @@ from pretend_gpu import GPU, GpuTensor, pretend_gpu
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.devices import in_background
-from splitnerf.ops import CELL_OCCUPIED
+from splitnerf.ops.rays import CELL_OCCUPIED
 from splitnerf.pipeline import reconstruct
 from splitnerf.render import model, occupancy, renderer
 from splitnerf.render.model import SceneModel

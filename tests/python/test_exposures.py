@@ -14,7 +14,8 @@ from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.data.pixels import per_channel
 from splitnerf.errors import InputError
 from splitnerf.evaluate.scoring import exposed_like
-from splitnerf.ops import EdgeRuns, pixel_losses, read_pixels
+from splitnerf.ops.rays import EdgeRuns, read_pixels
+from splitnerf.ops.training import pixel_losses
 from splitnerf.training import exposure
 from splitnerf.training.batches import draw_batch, edge_runs
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures

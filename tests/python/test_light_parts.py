@@ -10,7 +10,7 @@ from precision import precisions
 from splitnerf.fields import EvaluatedLight, Light, LightMlp, LightPyramid, SkyCells
 from splitnerf.fields import light as lights
 from splitnerf.fields.light import chain_resolution, is_resolved, lobe_roughness, panorama_directions, pyramid_filters
-from splitnerf.ops import sh_projection
+from splitnerf.ops.light import sh_projection
 
 # ---- evaluated lights ----
 

@@ -12,7 +12,7 @@ from op_cases import octahedral_directions
 from op_checks import generator, unit
 from splitnerf.data.environment import read_environment, sample_environment
 from splitnerf.fields import LightPyramid
-from splitnerf.ops import sample_ggx_lobe
+from splitnerf.ops.light import sample_ggx_lobe
 
 DATA = Path(os.environ.get("SPLITNERF_DATA", Path(__file__).parents[3] / "shared" / "data"))
 

@@ -5,8 +5,8 @@ import pytest
 import torch
 from op_checks import unit
 from splitnerf.data.asset import Asset, Material
-from splitnerf.ops import fibonacci_directions, monte_carlo_light, shade_sums, split_sum_shade, summed_light
-from splitnerf.ops.shading import SHADED
+from splitnerf.ops import fibonacci_directions, split_sum_shade
+from splitnerf.ops.shading import SHADED, monte_carlo_light, shade_sums, summed_light
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.subjects import MapLight
 from stability.cases import drawn_directions

@@ -199,7 +199,7 @@ POINT = {"normals": X, "view_dirs": X, "albedo": X, "roughness": ONE, "metallic"
             "light_queries: view_dirs must be dense, got torch.sparse_coo",
         ),
         (lambda: ops.linear_to_srgb(np.ones(3)), "linear_to_srgb: linear must be a tensor, got ndarray"),
-        (lambda: ops.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
+        (lambda: ops.light.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
         (
             lambda: ops.split_sum_shade(**POINT | {"compensate": "no"}),
             "split_sum_shade: compensate must be of type bool, got str",
@@ -215,7 +215,7 @@ def test_an_argument_of_another_type_is_named_in_one_line(call, words):
 def test_want_of_memory_is_said():
     """13 PB of directions."""
     with pytest.raises(MemoryError, match="^sample_ggx_lobe: aten::new_empty failed, as a rule for want of memory$"):
-        ops.sample_ggx_lobe(X.expand(1 << 20, 3), ONE.expand(1 << 20, 1), 1 << 20)
+        ops.light.sample_ggx_lobe(X.expand(1 << 20, 3), ONE.expand(1 << 20, 1), 1 << 20)
 
 
 def test_what_is_missing_or_unknown_is_named_by_python():
@@ -231,15 +231,15 @@ def batches(*shape: int) -> torch.Tensor:
 SPEC = ops.HashGridSpec(n_levels=2, log2_table_size=6)
 SCENE = ops.MeshScene(np.eye(3), np.array([[0, 1, 2]]))
 SHADE = {name: batches(1 if name in ("roughness", "metallic") else 3) for name in ops.shading.SHADED}
-SUMS = ops.LightSums(*(batches(3) for _ in range(4)))
+SUMS = ops.shading.LightSums(*(batches(3) for _ in range(4)))
 LIGHT = {"light_dirs": ops.fibonacci_directions(64), "light": torch.ones(64, 3)}
 IN_BATCHES = {
     "hash_encode": (ops.hash_encode, {"positions": batches(3)}, {"table": torch.rand(SPEC.n_entries, 2), "spec": SPEC}),
     "light_queries": (ops.light_queries, {k: SHADE[k] for k in ("normals", "view_dirs", "roughness")}, {}),
     "split_sum_shade": (ops.split_sum_shade, SHADE, {}),
-    "shade_sums": (ops.shade_sums, {k: SHADE[k] for k in ops.shading.SHADED[:5]} | {"sums": SUMS}, {}),
+    "shade_sums": (ops.shading.shade_sums, {k: SHADE[k] for k in ops.shading.SHADED[:5]} | {"sums": SUMS}, {}),
     "prefilter_light": (ops.prefilter_light, {"query_dirs": batches(3), "roughness": batches(1)}, LIGHT),
-    "sample_ggx_lobe": (ops.sample_ggx_lobe, {"axes": batches(3), "roughness": batches(1)}, {"n_samples": 3}),
+    "sample_ggx_lobe": (ops.light.sample_ggx_lobe, {"axes": batches(3), "roughness": batches(1)}, {"n_samples": 3}),
     "occlusion_factors": (
         ops.occlusion_factors,
         {name: batches(3) for name in ("positions", "normals", "lobe_dirs")} | {"roughness": batches(1)},

@@ -5,7 +5,8 @@ import torch
 from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, hash_inputs, sampling_settings
 from op_checks import DEVICES, check_error, generator, lib
 from splitnerf.fields.surface import SdfField
-from splitnerf.ops import HashGrid, HashGridSpec, growth_for, hash_encode, sample_rays
+from splitnerf.ops import HashGrid, HashGridSpec, hash_encode
+from splitnerf.ops.sdf import growth_for, sample_rays
 
 DTYPES = [torch.float16, torch.bfloat16]
 each_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=["float16", "bfloat16"])

@@ -10,16 +10,9 @@ from mesh_shapes import grid_mesh, scene_of
 from op_checks import generator, unit
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops import (
-    IncomingLight,
-    MeshScene,
-    TexturedSurface,
-    incoming_light,
-    monte_carlo_light,
-    shade_sums,
-    split_sum_shade,
-)
-from splitnerf.ops.shading import SHADED
+from splitnerf.ops import MeshScene, split_sum_shade
+from splitnerf.ops.shading import SHADED, monte_carlo_light, shade_sums
+from splitnerf.ops.visibility import IncomingLight, TexturedSurface, incoming_light
 from splitnerf.render.path_traced import AssetRenderer
 
 SIGMAS = 4.5

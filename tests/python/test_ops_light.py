@@ -3,7 +3,8 @@
 import pytest
 import torch
 from op_checks import generator, unit
-from splitnerf.ops import fibonacci_directions, prefilter_light, sample_ggx_lobe
+from splitnerf.ops import fibonacci_directions, prefilter_light
+from splitnerf.ops.light import sample_ggx_lobe
 
 
 def test_fibonacci_directions_are_uniform_and_seeded():

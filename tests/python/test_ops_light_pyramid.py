@@ -7,7 +7,7 @@ import torch
 from op_cases import LIGHT_NODES, lookup_inputs, octahedral_directions
 from op_checks import check_error, generator, lib, unit
 from splitnerf import _core
-from splitnerf.ops import (
+from splitnerf.ops.light import (
     SparseMap,
     SparseRows,
     light_averages,

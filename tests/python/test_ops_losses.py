@@ -6,7 +6,10 @@ import pytest
 import torch
 from op_cases import field_gradients, pixel_inputs
 from op_checks import generator, lib
-from splitnerf.ops import gradient_losses, light_prior, linear_to_srgb, pixel_losses, quadratic_entropy, srgb_to_linear
+from splitnerf.ops import linear_to_srgb
+from splitnerf.ops.light import light_prior
+from splitnerf.ops.shading import srgb_to_linear
+from splitnerf.ops.training import gradient_losses, pixel_losses, quadratic_entropy
 
 # ---- pixels ----
 

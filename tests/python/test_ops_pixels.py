@@ -3,7 +3,7 @@
 import pytest
 import torch
 from op_checks import generator
-from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
+from splitnerf.ops.rays import EdgeRuns, PixelList, draw_rays, read_pixels
 
 CPU = torch.device("cpu")
 CAMERAS = torch.eye(3).repeat(2, 1, 1), torch.tensor([[0.0, 0.0, 0.0], [7.0, 8.0, 9.0]])

@@ -4,7 +4,8 @@ import pytest
 import torch
 from op_checks import check_error, generator, lib
 from ray_inputs import packed_samples, surface_inputs
-from splitnerf.ops import PackedSamples, composite, spread_samples, surface_weights
+from splitnerf.ops import composite, surface_weights
+from splitnerf.ops.rays import PackedSamples, spread_samples
 
 # ---- surface_weights ----
 

@@ -6,7 +6,9 @@ import pytest
 import torch
 from op_cases import BOX, SDF_SPEC, STEP, bumpy_field, field_rays, full_cells, sampling_settings, sdf_field_inputs
 from op_checks import generator, grad_leaves, lib
-from splitnerf.ops import CELL_EMPTY, SdfNetwork, march_rays, sample_rays, sdf_values, surface_weights
+from splitnerf.ops import march_rays, surface_weights
+from splitnerf.ops.rays import CELL_EMPTY
+from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_values
 
 
 def sampled(field, rays: tuple, cells: torch.Tensor | None = None, **settings) -> tuple:

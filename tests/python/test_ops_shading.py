@@ -7,18 +7,16 @@ import torch
 from op_cases import drawn_inputs, shared_inputs
 from op_checks import check_error, lib, unit
 from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
-from splitnerf.ops import (
+from splitnerf.ops import light_queries, shading, split_sum_shade
+from splitnerf.ops.shading import (
+    SHADED,
     LightSums,
     brdf_lut,
-    light_queries,
     monte_carlo_light,
     shade_sums,
-    shading,
-    split_sum_shade,
     summed_correction,
     summed_light,
 )
-from splitnerf.ops.shading import SHADED
 from stability.cases import drawn_directions
 
 # ---- the split sum ----

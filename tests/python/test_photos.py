@@ -19,7 +19,7 @@ from splitnerf.data.images import area_average, linear_to_srgb, read_image, srgb
 from splitnerf.data.pixels import Photos, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
-from splitnerf.ops import draw_rays
+from splitnerf.ops.rays import draw_rays
 from splitnerf.render.occupancy import widened
 from splitnerf.training import loop
 from splitnerf.training.batches import (

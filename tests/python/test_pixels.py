@@ -13,7 +13,7 @@ from op_checks import generator
 from precision import precisions
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
-from splitnerf.ops import EdgeRuns, read_pixels
+from splitnerf.ops.rays import EdgeRuns, read_pixels
 from splitnerf.render.rays import image_rays
 from splitnerf.training.batches import PixelSource, band, draw_batch, edge_of, edge_runs, filled_in
 from tiny_runs import tiny

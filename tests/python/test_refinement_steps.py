@@ -6,7 +6,7 @@ import torch
 from painted_ball import sky
 from splitnerf import _core
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops import monte_carlo_light
+from splitnerf.ops.shading import monte_carlo_light
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows

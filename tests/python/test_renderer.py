@@ -5,7 +5,7 @@ import torch
 from op_checks import generator, unit
 from splitnerf.fields import LightMlp, Occlusion
 from splitnerf.fields.surface import SdfSample
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED
+from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render import renderer
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import ProbePoints, RenderedRays, find_samples, render_rays, render_view

@@ -7,7 +7,7 @@ import pytest
 import torch
 from blender_data import look_at
 from splitnerf.config import preset
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
+from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 
 RADIUS = 0.7

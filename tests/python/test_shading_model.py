@@ -5,7 +5,7 @@ import reference
 import torch
 from op_checks import generator, unit
 from splitnerf.fields import Light, Occlusion
-from splitnerf.ops import brdf_lut
+from splitnerf.ops.shading import brdf_lut
 from splitnerf.render.model import SceneModel, ShadedPoints
 from test_views import Given
 from tiny_runs import tiny

@@ -11,7 +11,8 @@ from splitnerf import _core
 from splitnerf.config import Config
 from splitnerf.fields import Light
 from splitnerf.fields.light import panorama_directions
-from splitnerf.ops import light_queries, monte_carlo_light, prefilter_light, shade_sums, split_sum_shade
+from splitnerf.ops import light_queries, prefilter_light, split_sum_shade
+from splitnerf.ops.shading import monte_carlo_light, shade_sums
 from splitnerf.render.model import SceneModel, ShadedPoints
 from test_views import Given
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.cli.common import Stages
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.devices import same_bits

@@ -7,7 +7,8 @@ import torch
 from op_checks import generator, unit
 from splitnerf.config import preset
 from splitnerf.fields import Occlusion, RaySegments
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, HashGridSpec, light_queries
+from splitnerf.ops import HashGridSpec, light_queries
+from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step

@@ -10,7 +10,7 @@ from mesh_shapes import OFFSET, cache_of, corners, grid_mesh, lattice, scene_of
 from op_cases import cached_occlusion_inputs
 from op_checks import lib
 from splitnerf import _core
-from splitnerf.ops import VisibilityCache, cached_occlusion, visibility_bits
+from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, visibility_bits
 
 UP = torch.tensor([[0.0, 0.0, 1.0]])
 

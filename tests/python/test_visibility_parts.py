@@ -11,7 +11,8 @@ from op_checks import generator, unit
 from splitnerf.fields import Light, RaySegments, SkyCells, VisibilityBits
 from splitnerf.fields.light import lobe_roughness, panorama_directions
 from splitnerf.fields.occlusion import bit_counts
-from splitnerf.ops import VisibilityCache, cached_occlusion, light_queries
+from splitnerf.ops import light_queries
+from splitnerf.ops.visibility import VisibilityCache, cached_occlusion
 from splitnerf.render import model as rendering
 from tiny_runs import tiny
 from torch.nn import functional as F

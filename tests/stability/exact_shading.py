@@ -1,7 +1,7 @@
 """Shading in arbitrary precision, written from the equations: one point at a time, with mpmath."""
 
 import numpy as np
-from splitnerf.ops import brdf_lut
+from splitnerf.ops.shading import brdf_lut
 
 from stability.entry import Rows
 from stability.precise import mp, vector

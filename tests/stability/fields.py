@@ -87,8 +87,8 @@ def field(rows: Rows, shared: Rows) -> Rows:
 
 def values(rows: Rows, shared: Rows) -> Rows:
     weights = [shared[name] for name in ("hidden", "hidden_bias", "out", "out_bias")]
-    field = ops.SdfNetwork(SPEC, SPEC.n_levels, 1e-3 * shared["table"], *weights, BETA, BOX)
-    return {"values": ops.sdf_values(rows["positions"], field)[:, None]}
+    field = ops.sdf.SdfNetwork(SPEC, SPEC.n_levels, 1e-3 * shared["table"], *weights, BETA, BOX)
+    return {"values": ops.sdf.sdf_values(rows["positions"], field)[:, None]}
 
 
 def grid_entry(name: str, call, dtype: torch.dtype = torch.float32) -> Entry:

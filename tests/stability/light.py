@@ -70,28 +70,28 @@ def pyramid() -> Rows:
     levels[300:310] = 0
     sh = 0.1 * draw.normal(SH_COEFFICIENTS, 3)
     sh[0] = torch.tensor([4.0, 0.5, 1e-3])
-    return {"levels": levels.float(), "sh": sh.float(), "zonal": ops.zonal_factors(NODES[-1], ZONAL_ROWS)}
+    return {"levels": levels.float(), "sh": sh.float(), "zonal": ops.light.zonal_factors(NODES[-1], ZONAL_ROWS)}
 
 
 def looked_up(rows: Rows, shared: Rows) -> Rows:
     resolutions, nodes = torch.tensor(RESOLUTIONS), torch.tensor(NODES, dtype=torch.float64)
     return {
-        "radiance": ops.light_lookup(
+        "radiance": ops.light.light_lookup(
             rows["directions"], rows["roughness"], shared["levels"], shared["sh"], resolutions, nodes, shared["zonal"]
         )
     }
 
 
 @lru_cache(maxsize=2)
-def matrix(dtype: torch.dtype) -> ops.SparseMap:
+def matrix(dtype: torch.dtype) -> ops.light.SparseMap:
     """Filters of an 8^2 map, the same float32 numbers in either precision."""
-    return ops.light_filters(8, [(8, 0.3), (4, 0.4)]).to(dtype)
+    return ops.light.light_filters(8, [(8, 0.3), (4, 0.4)]).to(dtype)
 
 
 def products(rows: Rows, shared: Rows) -> Rows:
     """One product a row."""
     values: Tensor = rows["values"]
-    found = [ops.sparse_product(matrix(values.dtype), x) for x in values]
+    found = [ops.light.sparse_product(matrix(values.dtype), x) for x in values]
     return {"products": torch.stack(found) if found else values.new_empty(0, 80, 3)}
 
 

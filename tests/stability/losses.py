@@ -40,7 +40,7 @@ def pixels(rows: Rows, shared: Rows) -> Rows:
     names = ("mean", "opacity", "target", "background", "whole")
 
     def losses(*given: Tensor, linear: bool = True) -> Tensor:
-        return ops.pixel_losses(**dict(zip(names, given)), linear=linear)
+        return ops.training.pixel_losses(**dict(zip(names, given)), linear=linear)
 
     linear = batches(rows, names, losses, ("colour", "mask"))
     encoded = batches(rows, names, lambda *x: losses(*x, linear=False), ("colour of sRGB", "mask of sRGB"))
@@ -65,7 +65,10 @@ def draw_gradients(draw: Draw, n: int) -> Rows:
 def field_gradients(rows: Rows, shared: Rows) -> Rows:
     beside = torch.arange(PAIRS)
     return batches(
-        rows, ("gradients", "weights"), lambda g, w: ops.gradient_losses(g, w, beside), ("eikonal", "smoothness")
+        rows,
+        ("gradients", "weights"),
+        lambda g, w: ops.training.gradient_losses(g, w, beside),
+        ("eikonal", "smoothness"),
     )
 
 
@@ -116,7 +119,7 @@ ENTRIES = (
         smooth=("x",),
         bound=2e-6,
         gradient_bound=4e-6,
-        call=lambda rows, shared: batches(rows, ("x",), lambda x: (ops.quadratic_entropy(x),), ("entropy",)),
+        call=lambda rows, shared: batches(rows, ("x",), lambda x: (ops.training.quadratic_entropy(x),), ("entropy",)),
         size=POINTS,
         chunk=256,
         floor=1.0,
@@ -130,7 +133,7 @@ ENTRIES = (
         smooth=("texels",),
         bound=4e-6,
         gradient_bound=8e-6,
-        call=lambda rows, shared: batches(rows, ("texels",), lambda x: (ops.light_prior(x, LEVELS),), ("prior",)),
+        call=lambda rows, shared: batches(rows, ("texels",), lambda x: (ops.light.light_prior(x, LEVELS),), ("prior",)),
         size=POINTS,
         chunk=256,
         floor=1e-12,

@@ -84,13 +84,13 @@ def open_outside(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 
 
 @lru_cache(maxsize=1)
-def chequered() -> ops.TexturedSurface:
+def chequered() -> ops.visibility.TexturedSurface:
     """The cube, its normals those of its corners, with textures of extremes."""
     n, black_and_white = len(CORNERS), (torch.arange(16).reshape(4, 4) * 5 % 3 % 2).float()
     normals = unit(CORNERS.double()).float()
     side = unit(torch.linalg.cross(normals, torch.tensor([0.0, 0.0, 1.0]).expand(n, 3)))
     tilts = torch.stack([2 * black_and_white - 1, 1 - 2 * black_and_white.T, 0 * black_and_white], -1)
-    return ops.TexturedSurface(
+    return ops.visibility.TexturedSurface(
         cube(),
         normals,
         torch.cat([side, torch.ones(n, 1)], 1),
@@ -121,7 +121,7 @@ def light_arriving(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     sky = torch.full((4, 8, 3), draw.pick((0.0, 1e-38, 1.0, 1e6), 1).item())
     sky[1, 2] = max(sky[0, 0, 0].item(), 1e6 if draw.chance(0.5, 1).item() else 0.0)
     seed = int(draw.uniform(1).item() * 1e9)
-    found = ops.incoming_light(chequered(), sky, **rows, n_directions=8, max_bounces=3, seed=seed)
+    found = ops.visibility.incoming_light(chequered(), sky, **rows, n_directions=8, max_bounces=3, seed=seed)
     directions = found.directions.double()
     length = directions.norm(dim=-1)
     wrong = ((length - 1).abs() > 2e-6) & (found.pdf > 0)
@@ -167,10 +167,10 @@ def all_blocked(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 
 
 @lru_cache(maxsize=1)
-def cache() -> ops.VisibilityCache:
+def cache() -> ops.visibility.VisibilityCache:
     vertices = HALF * CORNERS
     directions = ops.fibonacci_directions(64, torch.Generator().manual_seed(0))
-    return ops.VisibilityCache.trace(
+    return ops.visibility.VisibilityCache.trace(
         cube(), vertices, unit(vertices.double()).float(), 24 * HALF**2, directions, with_hits=True
     )
 
@@ -179,7 +179,7 @@ def bits_apart(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """No direction is open and blocked; those within the horizon of the normal are one of both."""
     positions, normals = (x.float() for x in on_cube(draw, n))
     directions = cache().directions
-    bits, hits = ops.visibility_bits(cube(), positions, normals, directions, 1e-3, with_hits=True)
+    bits, hits = ops.visibility.visibility_bits(cube(), positions, normals, directions, 1e-3, with_hits=True)
     marks = (bits[..., None] >> torch.arange(32) & 1).reshape(n, 2, -1).bool()
     cosine = normals.double() @ directions.double().T
     wrong = (marks[:, 0] & marks[:, 1]) | ((cosine > 1e-6) & ~marks.any(1)) | ((cosine < -1e-6) & marks.any(1))
@@ -192,8 +192,8 @@ def cached(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     rows, _ = occlusion_inputs(draw, n)
     light = torch.full((64, 3), draw.pick((0.0, 1e-38, 1.0, 1e30), 1).item())
     light[3] = max(1e6, light[0, 0].item()) if draw.chance(0.5, 1).item() else light[3]
-    o_d, o_s, i_d, i_s = ops.cached_occlusion(cache(), **rows, light=light, radiance=torch.ones(8, 3))
-    visible, arriving = ops.cached_visibility(cache(), rows["positions"], rows["normals"], torch.ones(8, 3))
+    o_d, o_s, i_d, i_s = ops.visibility.cached_occlusion(cache(), **rows, light=light, radiance=torch.ones(8, 3))
+    visible, arriving = ops.visibility.cached_visibility(cache(), rows["positions"], rows["normals"], torch.ones(8, 3))
     found = (o_d, o_s, i_d, i_s, visible, arriving)
     return torch.stack([finite_in(x, 0.0, 1.0) for x in found]).amax(0) - 1e-5, rows
 
@@ -232,8 +232,8 @@ def spread(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     weights = draw.shares(n * samples).float()
     starts = torch.arange(samples).repeat(n).float() / 8
     offsets = torch.arange(n + 1) * samples
-    packed = ops.PackedSamples(torch.arange(n).repeat_interleave(samples), starts, starts + 0.125, offsets)
-    found = ops.spread_samples(weights, packed, 3, draw.shares(n).clamp(max=1 - 6e-8).float(), 1.0)
+    packed = ops.rays.PackedSamples(torch.arange(n).repeat_interleave(samples), starts, starts + 0.125, offsets)
+    found = ops.rays.spread_samples(weights, packed, 3, draw.shares(n).clamp(max=1 - 6e-8).float(), 1.0)
     constant = found.interpolate(torch.full((len(found.shaded), 1), 3.0))
     wrong = finite_in(found.share.reshape(n, samples), 0.0, 1.0)
     wrong = torch.maximum(wrong, (constant.reshape(n, samples).double() - 3).abs().amax(1) - 1e-6)
@@ -247,7 +247,7 @@ def lobe_samples(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     """Unit vectors above the horizon whose cosines follow the distribution of D cos: a shifted lattice in its CDF."""
     count = 8
     axes, roughness = draw.directions(n).float(), draw.roughness(n).float()
-    found = ops.sample_ggx_lobe(axes, roughness, count, int(draw.uniform(1).item() * 1e9)).double()
+    found = ops.light.sample_ggx_lobe(axes, roughness, count, int(draw.uniform(1).item() * 1e9)).double()
     a = (roughness.double() ** 2).clamp(min=1e-4)
     apart = (found - unit(axes.double())[:, None]).square().sum(-1)  # 2 (1 - cosine)
     cosine, b = 1 - apart / 2, (1 - a * a) / 2

@@ -12,7 +12,7 @@ from stability.entry import Entry, Rows
 
 UNITS = ("normals", "view_dirs", "light_dirs")
 IN_UNIT_RANGE = ("albedo", "roughness", "metallic", "occlusion_s", "occlusion_d", "share")
-TABLE = {"lut": ops.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
+TABLE = {"lut": ops.shading.brdf_lut()}  # always float32; its numbers are as uncertain as the rest
 SAMPLES = 4  # directions a point
 NO_SHARE = 1e-36  # of components of directions: a cosine over pi should have a float32
 BY_CONDITION = "a few roundings, times how much the true value changes by a relative change of the inputs and the table"
@@ -61,7 +61,9 @@ def draw_shaded(draw: Draw, n: int) -> Rows:
 
 
 def draw_sums(draw: Draw, n: int) -> Rows:
-    light = {name: draw.radiance(n, 3) for name in (*ops.LightSums._fields, "other")} | {"share": draw.shares(n, 1)}
+    light = {name: draw.radiance(n, 3) for name in (*ops.shading.LightSums._fields, "other")} | {
+        "share": draw.shares(n, 1)
+    }
     return within_the_light(draw_material(draw, n) | light)
 
 
@@ -89,13 +91,16 @@ def draw_lit(draw: Draw, n: int) -> Rows:
 
 def shade_modes(rows: Rows, shared: Rows) -> Rows:
     given = [rows[name] for name in SHADED]
-    modes = {mode: (i, False) for i, mode in enumerate(ops.FRESNEL_MODES)} | {"compensated": (0, True)}
+    modes = {mode: (i, False) for i, mode in enumerate(ops.shading.FRESNEL_MODES)} | {"compensated": (0, True)}
     indirect = rows["indirect_s"], rows["indirect_d"]
     return {name: lib.split_sum_shade(*given, shared["lut"].float(), *mode, *indirect) for name, mode in modes.items()}
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [*(rows[name] for name in SHADED[:5]), torch.stack([rows[name] for name in ops.LightSums._fields], 1)]
+    given = [
+        *(rows[name] for name in SHADED[:5]),
+        torch.stack([rows[name] for name in ops.shading.LightSums._fields], 1),
+    ]
     modes = {
         "single": (False, None, None),
         "compensated": (True, None, None),
@@ -107,17 +112,17 @@ def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
 def directions(rows: Rows, shared: Rows) -> Rows:
     given = (rows["normals"], rows["view_dirs"], rows["roughness"])
     n, lut = len(given[0]), shared["lut"].float()
-    return {query: lib.light_queries(*given, lut, query == "mean")[0][:n] for query in ops.QUERIES}
+    return {query: lib.light_queries(*given, lut, query == "mean")[0][:n] for query in ops.shading.QUERIES}
 
 
 def light_sums(rows: Rows, shared: Rows) -> Rows:
     names = ("normals", "view_dirs", "roughness", "light_dirs", "pdf", "radiance")
-    return ops.monte_carlo_light(*(rows[name] for name in names))._asdict()
+    return ops.shading.monte_carlo_light(*(rows[name] for name in names))._asdict()
 
 
 def summed(rows: Rows, shared: Rows) -> Rows:
     given = [rows[name] for name in ("normals", "view_dirs", "roughness")]
-    return ops.summed_light(
+    return ops.shading.summed_light(
         *given, shared["directions"], shared["solid_angles"], shared["radiance"], rows["visible"], rows["sent"]
     )._asdict()
 
@@ -188,7 +193,7 @@ ENTRIES = (
         shared=TABLE,
         repair=lambda rows: within_the_light(repaired(rows)),
         bound=2e-6,
-        smooth=(*SHADED[:5], *ops.LightSums._fields, "other"),
+        smooth=(*SHADED[:5], *ops.shading.LightSums._fields, "other"),
         gradient_bound=4e-6,
         exact=exact_shading.shade_sums,
         exact_bound=1e-14,
@@ -241,7 +246,7 @@ ENTRIES = (
         exact=exact_shading.srgb_to_linear,
         exact_bound=1e-14,
         repair=lambda rows: {"srgb": rows["srgb"].clamp(0, 1e15)},
-        call=lambda rows, shared: {"linear": ops.srgb_to_linear(rows["srgb"])},
+        call=lambda rows, shared: {"linear": ops.shading.srgb_to_linear(rows["srgb"])},
         bound=4e-6,
         reason="x^2.4: the float32 nearest to 2.4 is off by 9e-8, times ln x of up to 35, and 2.4 roundings of x",
     ),

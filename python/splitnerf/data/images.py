@@ -202,12 +202,12 @@ def to_uint8(pixels: np.ndarray) -> np.ndarray:
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
-    """:func:`splitnerf.ops.srgb_to_linear` of an array."""
-    return ops.srgb_to_linear(torch.from_numpy(np.array(srgb, order="C"))).numpy()
+    """:func:`splitnerf.ops.shading.srgb_to_linear` of an array."""
+    return ops.shading.srgb_to_linear(torch.from_numpy(np.array(srgb, order="C"))).numpy()
 
 
 def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
-    """:func:`splitnerf.ops.linear_to_srgb` of an array."""
+    """:func:`splitnerf.ops.shading.linear_to_srgb` of an array."""
     return ops.linear_to_srgb(torch.from_numpy(np.array(linear, order="C"))).numpy()
 
 

@@ -109,7 +109,7 @@ def per_channel(exposures: np.ndarray) -> np.ndarray:
 
 def at_unit_exposure(values: Tensor, exposures: Tensor) -> Tensor:
     """sRGB values as they were at an exposure of 1, where each was exposed by `exposures` of the same shape."""
-    return torch.where(exposures == 1, values, ops.linear_to_srgb(ops.srgb_to_linear(values) / exposures))
+    return torch.where(exposures == 1, values, ops.linear_to_srgb(ops.shading.srgb_to_linear(values) / exposures))
 
 
 def memory_for_photos(max_memory: float) -> int:

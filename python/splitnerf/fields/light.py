@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.devices import tensor_cores
-from splitnerf.ops import (
+from splitnerf.ops.light import (
     SparseMap,
     light_averages,
     light_filters,
@@ -289,7 +289,7 @@ class PyramidFilters(NamedTuple):
         lobes: The map from these averages to the filtered maps.
         projection: [169, m^2], the map from averages of resolution m to spherical harmonics.
         projected: The rows of the averages that the projection reads.
-        resolutions, nodes, zonal: The arguments of :func:`splitnerf.ops.light_lookup` with these names.
+        resolutions, nodes, zonal: The arguments of :func:`splitnerf.ops.light.light_lookup` with these names.
     """
 
     sum_of_levels: SparseMap

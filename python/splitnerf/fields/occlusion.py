@@ -14,15 +14,9 @@ from torch.nn import functional as F
 
 from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, Light, LightTexels, mean_over, texel_roughness
-from splitnerf.ops import (
-    MeshScene,
-    SparseMap,
-    SparseRows,
-    VisibilityCache,
-    cached_occlusion,
-    cached_visibility,
-    sparse_product,
-)
+from splitnerf.ops import MeshScene
+from splitnerf.ops.light import SparseMap, SparseRows, sparse_product
+from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
@@ -134,7 +128,7 @@ class SkyCells(nn.Module):
     def summed_from(self) -> float:
         """The smallest roughness at which a sum over the k cells resolves the lobe.
 
-        A lobe of ggx_alpha = a effectively contains 3 k a^2 directions (see :func:`splitnerf.ops.cached_occlusion`).
+        A lobe of ggx_alpha = a effectively contains 3 k a^2 directions (see :func:`splitnerf.ops.visibility.cached_occlusion`).
         """
         return (LOBE_DIRECTIONS / (3.0 * len(self.centres))) ** 0.25
 
@@ -252,7 +246,7 @@ class VisibilityBits:
         roughness: Tensor,
         segments: RaySegments | None = None,
     ) -> Occlusion:
-        """The factors at points of the surface; the arguments are those of :func:`splitnerf.ops.cached_occlusion`. With
+        """The factors at points of the surface; the arguments are those of :func:`splitnerf.ops.visibility.cached_occlusion`. With
         segments, all points of one have the factors of its representative."""
         if segments is not None:
             chosen = (x.index_select(0, segments.representatives) for x in (positions, normals, lobe_dirs, roughness))

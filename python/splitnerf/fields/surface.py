@@ -12,7 +12,8 @@ from torch.nn import functional as F
 
 from splitnerf.devices import tensor_cores
 from splitnerf.fields.occlusion import Occlusion
-from splitnerf.ops import HashGrid, HashGridSpec, SdfNetwork, sdf_field, sdf_values
+from splitnerf.ops import HashGrid, HashGridSpec, sdf_field
+from splitnerf.ops.sdf import SdfNetwork, sdf_values
 
 SOFTPLUS_BETA = 100.0
 
@@ -39,7 +40,7 @@ class SdfField(nn.Module):
     """sdf(x) = W2 softplus_100(W1 [x, hash(x)] + b1) + b2, with weight normalisation.
 
     The gradient of one hidden layer has a closed form, so that a loss on normals needs a single backward pass. The hash
-    grid contributes through its Jacobian (:func:`splitnerf.ops.sdf_field`).
+    grid contributes through its Jacobian (:func:`splitnerf.ops.sdf.sdf_field`).
 
     Args:
         spec: Shape of the hash grid.
@@ -47,7 +48,7 @@ class SdfField(nn.Module):
         width: The number of hidden units.
         n_outputs: The number of outputs, with the distance.
         radius: The radius of the sphere that the field starts as, scene units.
-        table_dtype: The dtype in which the hash table is read, see :class:`splitnerf.ops.HashGrid`.
+        table_dtype: The dtype in which the hash table is read, see :class:`splitnerf.ops.sdf.HashGrid`.
 
     Source: NeuS (Wang et al. 2021) on a hash grid (Mueller et al. 2022), with the sizes of SplitNeRF's supplement;
     sphere

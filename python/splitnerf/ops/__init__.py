@@ -1,134 +1,31 @@
 """The operators of SplitNeRF: ``torch.ops.splitnerf.*`` with typed, documented wrappers.
 
-Each raises ValueError where a shape, dtype, number or name does not fit, TypeError where a tensor or a number is needed; the message
+These are the ones to begin with; all stand in :mod:`splitnerf.ops.sdf`, `rays`, `shading`, `light`, `visibility` and `training`. Each
+raises ValueError where a shape, dtype, number or name does not fit, TypeError where a tensor or a number is needed; the message
 names the operator and the argument. Where arguments are [n, ...] for n points, n may be any leading dimensions in their place.
 """
 
-from splitnerf.ops.light import (
-    SparseMap,
-    SparseRows,
-    fibonacci_directions,
-    light_averages,
-    light_filters,
-    light_lookup,
-    light_prior,
-    light_sum_of_levels,
-    prefilter_light,
-    sample_ggx_lobe,
-    sh_projection,
-    sparse_product,
-    zonal_factors,
-)
-from splitnerf.ops.rays import (
-    CELL_EMPTY,
-    CELL_OCCUPIED,
-    CELL_OPAQUE,
-    EdgeRuns,
-    PackedSamples,
-    PixelList,
-    ShadingSubset,
-    composite,
-    draw_rays,
-    march_rays,
-    read_pixels,
-    spread_samples,
-    surface_weights,
-)
-from splitnerf.ops.sdf import (
-    HashGrid,
-    HashGridSpec,
-    SdfNetwork,
-    growth_for,
-    hash_encode,
-    sample_rays,
-    sdf_field,
-    sdf_values,
-)
-from splitnerf.ops.shading import (
-    FRESNEL_MODES,
-    QUERIES,
-    LightSums,
-    brdf_lut,
-    light_queries,
-    linear_to_srgb,
-    monte_carlo_light,
-    shade_sums,
-    split_sum_shade,
-    srgb_to_linear,
-    summed_correction,
-    summed_light,
-)
-from splitnerf.ops.training import AdamW, gradient_losses, pixel_losses, quadratic_entropy
-from splitnerf.ops.visibility import (
-    IncomingLight,
-    MeshScene,
-    TexturedSurface,
-    VisibilityCache,
-    cached_occlusion,
-    cached_visibility,
-    incoming_light,
-    occlusion_factors,
-    visibility_bits,
-)
+from splitnerf.ops.light import fibonacci_directions, prefilter_light
+from splitnerf.ops.rays import composite, march_rays, surface_weights
+from splitnerf.ops.sdf import HashGrid, HashGridSpec, hash_encode, sdf_field
+from splitnerf.ops.shading import light_queries, linear_to_srgb, split_sum_shade
+from splitnerf.ops.training import AdamW
+from splitnerf.ops.visibility import MeshScene, occlusion_factors
 
 __all__ = [
     "AdamW",
-    "CELL_EMPTY",
-    "CELL_OCCUPIED",
-    "CELL_OPAQUE",
-    "EdgeRuns",
-    "FRESNEL_MODES",
     "HashGrid",
     "HashGridSpec",
-    "IncomingLight",
-    "LightSums",
     "MeshScene",
-    "PackedSamples",
-    "PixelList",
-    "QUERIES",
-    "SdfNetwork",
-    "ShadingSubset",
-    "SparseMap",
-    "SparseRows",
-    "TexturedSurface",
-    "VisibilityCache",
-    "brdf_lut",
-    "cached_occlusion",
-    "cached_visibility",
     "composite",
-    "draw_rays",
     "fibonacci_directions",
-    "gradient_losses",
-    "growth_for",
     "hash_encode",
-    "incoming_light",
-    "light_averages",
-    "light_filters",
-    "light_lookup",
-    "light_prior",
     "light_queries",
-    "light_sum_of_levels",
     "linear_to_srgb",
     "march_rays",
-    "monte_carlo_light",
     "occlusion_factors",
-    "pixel_losses",
     "prefilter_light",
-    "quadratic_entropy",
-    "read_pixels",
-    "sample_ggx_lobe",
-    "sample_rays",
     "sdf_field",
-    "sdf_values",
-    "sh_projection",
-    "shade_sums",
-    "sparse_product",
     "split_sum_shade",
-    "spread_samples",
-    "srgb_to_linear",
-    "summed_correction",
-    "summed_light",
     "surface_weights",
-    "visibility_bits",
-    "zonal_factors",
 ]

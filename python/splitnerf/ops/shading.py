@@ -223,7 +223,7 @@ def shade_sums(
        L = m\, gain_m \left[albedo\, (specular - grazing) + grazing\right]
            + (1 - m) \left[gain_d\, dielectric + (1 - E_d)\, albedo\, diffuse\right]
 
-    with E_d and the gains of multiple scattering as in :func:`splitnerf.ops.split_sum_shade` in its ``exact`` mode.
+    with E_d and the gains of multiple scattering as in :func:`splitnerf.ops.shading.split_sum_shade` in its ``exact`` mode.
 
     Args:
         normals, view_dirs: [n, 3] unit; a normal that faces away from the viewer is negated.

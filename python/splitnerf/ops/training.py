@@ -159,7 +159,7 @@ class AdamW(torch.optim.Optimizer):
         sparse: Whether to skip rows (of the last dimension) whose gradients are all exactly 0: the parameter and both
             moments do not change there.
         copies: Rounded copies that a step also writes, by parameter: ``{grid.table: grid.copy}`` of a
-            :class:`splitnerf.ops.HashGrid` with a table_dtype. Without it the grid renews its copy itself.
+            :class:`splitnerf.ops.sdf.HashGrid` with a table_dtype. Without it the grid renews its copy itself.
 
     Attributes:
         counted: The counts of steps that the last step has raised, those of the parameters with a gradient.

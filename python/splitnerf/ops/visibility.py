@@ -104,7 +104,7 @@ def occlusion_factors(
     Args:
         scene: The mesh.
         positions, normals: [n, 3] positions (scene units) and unit normals.
-        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.light_queries`).
+        lobe_dirs: [n, 3] unit axes of the specular lobe (:func:`splitnerf.ops.shading.light_queries`).
         roughness: [n, 1] perceptual roughness in [0, 1].
         environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
         n_diffuse_rays, n_specular_rays: The numbers of rays per point.
@@ -261,7 +261,7 @@ def cached_occlusion(
     Args:
         cache: The mesh's bits; with hits where ``radiance`` is given.
         positions, normals: [n, 3] float32 positions (scene units) and unit normals n.
-        lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.light_queries`).
+        lobe_dirs: [n, 3] float32 unit axes d of the specular lobe (:func:`splitnerf.ops.shading.light_queries`).
         roughness: [n, 1] float32 perceptual roughness in [0, 1].
         light: [k, 3] float32 mean radiance L_i of the environment over the cell of each of the cache's directions.
         radiance: [m, 3] float32 radiance that the mesh sends out, or None. A hit past the last row sends nothing.

@@ -6,14 +6,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.ops import LightSums, brdf_lut
+from splitnerf.ops.shading import LightSums, brdf_lut
 from splitnerf.refinement.texels import MIN_COSINE
 
 MIN_WHITE = 1e-6  # integral of a white light below which a lobe got no directions
 
 
 def white_sums(normals: Tensor, view_dirs: Tensor, roughness: Tensor) -> LightSums:
-    """The integrals of a light of 1 from everywhere, [n, 1] each, by the table of :func:`splitnerf.ops.brdf_lut`."""
+    """The integrals of a light of 1 from everywhere, [n, 1] each, by the table of :func:`splitnerf.ops.shading.brdf_lut`."""
     n_dot_v = (normals * view_dirs).sum(1, keepdim=True).clamp(MIN_COSINE, 1.0)
     at = 2.0 * torch.cat([n_dot_v.sqrt(), roughness.clamp(0.0, 1.0)], dim=1) - 1.0
     table = brdf_lut().permute(2, 0, 1)[None]

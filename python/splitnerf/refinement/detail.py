@@ -30,7 +30,9 @@ from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.export.bake import nearest_rows, rasterise
-from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light
+from splitnerf.ops import MeshScene
+from splitnerf.ops.shading import monte_carlo_light
+from splitnerf.ops.visibility import TexturedSurface, incoming_light
 from splitnerf.refinement.fit import MIN_TONE, srgb_slope
 from splitnerf.refinement.light import footprints, read
 from splitnerf.refinement.pixels import HELD_OUT, MIN_ALPHA

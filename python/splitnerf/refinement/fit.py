@@ -25,7 +25,9 @@ from splitnerf.data.dataset import Dataset, spread
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.tensor_files import check_tensor
 from splitnerf.errors import InputError
-from splitnerf.ops import MeshScene, TexturedSurface, incoming_light, monte_carlo_light, shade_sums
+from splitnerf.ops import MeshScene
+from splitnerf.ops.shading import monte_carlo_light, shade_sums
+from splitnerf.ops.visibility import TexturedSurface, incoming_light
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp, power_of
 from splitnerf.refinement.level import at_level, level_of_light, under_lamp

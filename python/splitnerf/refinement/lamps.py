@@ -19,7 +19,8 @@ import torch
 from splitnerf.data.asset import unit
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
-from splitnerf.ops import MeshScene, visibility_bits
+from splitnerf.ops import MeshScene
+from splitnerf.ops.visibility import visibility_bits
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
 REACH = 30.0  # degrees from a lobe's middle to its end

@@ -25,7 +25,9 @@ from splitnerf.fields import (
 )
 from splitnerf.fields.light import lobe_roughness, mean_over
 from splitnerf.fields.surface import SdfSample
-from splitnerf.ops import HashGridSpec, MeshScene, cached_occlusion, light_queries, split_sum_shade, summed_correction
+from splitnerf.ops import HashGridSpec, MeshScene, light_queries, split_sum_shade
+from splitnerf.ops.shading import summed_correction
+from splitnerf.ops.visibility import cached_occlusion
 
 ENVIRONMENT_ROWS = 128  # of the image of a trained light
 MATERIAL = "albedo", "roughness", "metallic"

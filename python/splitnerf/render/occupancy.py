@@ -11,7 +11,7 @@ from torch.nn.functional import logsigmoid
 
 from splitnerf.config import Config
 from splitnerf.devices import start_fetching
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
+from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.rays import projected
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak

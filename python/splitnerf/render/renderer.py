@@ -12,16 +12,9 @@ from torch import Tensor
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
 from splitnerf.fields import EvaluatedLight, RaySegments
-from splitnerf.ops import (
-    PackedSamples,
-    ShadingSubset,
-    composite,
-    linear_to_srgb,
-    march_rays,
-    sample_rays,
-    spread_samples,
-    surface_weights,
-)
+from splitnerf.ops import composite, linear_to_srgb, march_rays, surface_weights
+from splitnerf.ops.rays import PackedSamples, ShadingSubset, spread_samples
+from splitnerf.ops.sdf import sample_rays
 from splitnerf.render.model import SceneModel, ShadedPoints
 from splitnerf.render.occupancy import DENSITY_CUTOFF, LIPSCHITZ, OccupancyGrid
 from splitnerf.render.rays import image_rays
@@ -55,7 +48,7 @@ class FoundSamples(NamedTuple):
     Attributes:
         packed: The distances of the samples along their rays.
         rays_d: [n_rays, 3] unit directions.
-        phase: [n_rays] in [0, 1), random offset of the marks that :func:`splitnerf.ops.spread_samples` draws with.
+        phase: [n_rays] in [0, 1), random offset of the marks that :func:`splitnerf.ops.rays.spread_samples` draws with.
         positions: [n + k + m, 3] the midpoints of the n samples with the padding, then the k + m probes, scene units.
         directions: [n, 3] unit directions of the samples' rays.
         beside: [m] int64, the samples whose neighbours the last m positions are.
@@ -256,7 +249,7 @@ def render_rays(
         found: The samples; the field may have changed slightly since the search.
         shades_per_ray: The approximate number of shaded samples per ray; the values of the other samples are
             interpolated. 0 shades all.
-        capacity: The capacity for shaded samples and segments, see :func:`splitnerf.ops.spread_samples`; with None the
+        capacity: The capacity for shaded samples and segments, see :func:`splitnerf.ops.rays.spread_samples`; with None the
             host waits for the GPU's counts. If ``sizes`` of the result exceeds the capacity, the colours have no
             meaning.
         turns: [n_rays, 3, 3] rotations of directions into the light's frame; None where the light stands still.

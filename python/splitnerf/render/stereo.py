@@ -17,7 +17,8 @@ from torch.nn import functional as F
 
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import averaged_codes, decoded
-from splitnerf.ops import CELL_EMPTY, CELL_OCCUPIED, march_rays
+from splitnerf.ops import march_rays
+from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render.rays import image_rays, projected
 
 MOST_PHOTOS, MOST_VIEWS = 150, 50  # that are compared, and that get depths

@@ -18,7 +18,7 @@ from splitnerf.data.lens import pixel_width
 from splitnerf.data.pixels import Photos, ask_for, at_unit_exposure, averaged_codes, decoded, file_of
 from splitnerf.errors import note
 from splitnerf.memory import give_back
-from splitnerf.ops import EdgeRuns, PixelList, draw_rays, read_pixels
+from splitnerf.ops.rays import EdgeRuns, PixelList, draw_rays, read_pixels
 from splitnerf.render.occupancy import visual_hull, widened
 from splitnerf.render.rays import pixel_matrix
 from splitnerf.render.renderer import ProbePoints
@@ -212,7 +212,7 @@ class PixelReader:
     def read(
         self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: EdgeRuns
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.read_pixels`."""
+        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.rays.read_pixels`."""
         if self.file is not None:
             size = 4 * self.codes.element_size()
             for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
@@ -280,7 +280,7 @@ class PixelSource:
     def draw(
         self, n: int, random: Tensor | None = None, backgrounds: Tensor | None = None, exposures: Tensor | None = None
     ) -> tuple[Tensor, ...]:
-        """Draws n rays, see :func:`splitnerf.ops.draw_rays`: the first seven of :class:`Batch`, the photos as they are.
+        """Draws n rays, see :func:`splitnerf.ops.rays.draw_rays`: the first seven of :class:`Batch`, the photos as they are.
 
         Args:
             n: The number of rays.

@@ -9,7 +9,7 @@ from torch import Tensor
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.tensor_files import check_tensor
-from splitnerf.ops import srgb_to_linear
+from splitnerf.ops.shading import srgb_to_linear
 
 KEEP = 0.998  # share of the sums that outlives a step
 ENOUGH = 50.0  # pixels of a photo that count as much as the start

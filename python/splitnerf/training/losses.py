@@ -15,17 +15,9 @@ from splitnerf.config import Config
 from splitnerf.data.environment import seen_at
 from splitnerf.devices import pinned
 from splitnerf.fields import EvaluatedLight, Light, LightPyramid
-from splitnerf.ops import (
-    MeshScene,
-    fibonacci_directions,
-    gradient_losses,
-    light_prior,
-    occlusion_factors,
-    pixel_losses,
-    prefilter_light,
-    quadratic_entropy,
-    sample_ggx_lobe,
-)
+from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light
+from splitnerf.ops.light import light_prior, sample_ggx_lobe
+from splitnerf.ops.training import gradient_losses, pixel_losses, quadratic_entropy
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch

@@ -12,7 +12,8 @@ from torch import Tensor
 from splitnerf.devices import SideStream, in_background
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields import EvaluatedLight, VisibilityBits
-from splitnerf.ops import MeshScene, SdfNetwork, sdf_values
+from splitnerf.ops import MeshScene
+from splitnerf.ops.sdf import SdfNetwork, sdf_values
 from splitnerf.render.model import SceneModel
 
 ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the occlusion

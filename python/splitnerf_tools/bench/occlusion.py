@@ -9,7 +9,8 @@ import torch
 import trimesh
 from splitnerf.config import preset
 from splitnerf.fields import Light, SkyCells, VisibilityBits
-from splitnerf.ops import MeshScene, occlusion_factors, sample_ggx_lobe
+from splitnerf.ops import MeshScene, occlusion_factors
+from splitnerf.ops.light import sample_ggx_lobe
 from torch import Tensor
 from torch.nn import functional as F
 

@@ -8,14 +8,8 @@ from collections.abc import Callable
 import torch
 from splitnerf import _core
 from splitnerf.config import Config, preset
-from splitnerf.ops import (
-    fibonacci_directions,
-    light_lookup,
-    prefilter_light,
-    sample_ggx_lobe,
-    sh_projection,
-    zonal_factors,
-)
+from splitnerf.ops import fibonacci_directions, prefilter_light
+from splitnerf.ops.light import light_lookup, sample_ggx_lobe, sh_projection, zonal_factors
 from torch import Tensor
 from torch.nn import functional as F
 

@@ -14,7 +14,9 @@ from functools import cache
 import numpy as np
 import torch
 from splitnerf import _core
-from splitnerf.ops import HashGridSpec, MeshScene, brdf_lut, sh_projection, zonal_factors
+from splitnerf.ops import HashGridSpec, MeshScene
+from splitnerf.ops.light import sh_projection, zonal_factors
+from splitnerf.ops.shading import brdf_lut
 from torch import Tensor
 
 N = 38  # points: two full vectors of 16 and a rest
