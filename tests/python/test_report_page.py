@@ -14,7 +14,7 @@ from splitnerf_tools.report import write_report
 
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
 LAMP = (5, 12)  # row and column of a texel of the true light
-CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals"]
+CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals", "occlusion"]
 LIGHT, INPUT = "document.querySelector('#object [name=light]')", "l.dispatchEvent(new Event('input', {bubbles: true}))"
 NO_WEBGL = """const plain = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.startsWith("webgl") ? null : plain.call(this, kind, ...rest); };"""
@@ -43,7 +43,8 @@ def report(ball, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     materials = np.full((64, 64, 2), (0.25, 0.0), np.float32)
     brown = np.full((64, 64, 3), (0.6, 0.3, 0.1), np.float32)
-    write_glb(folder / "mesh.glb", with_textures(ball, albedo_texture=brown, roughness_metallic_texture=materials))
+    asset = with_textures(ball, albedo_texture=brown, roughness_metallic_texture=materials)
+    write_glb(folder / "mesh.glb", asset, np.full((64, 64), 0.8, np.float32))
     tilted = plain(BLUE)
     tilted["normal"] = np.tile(np.float32([0.5, 0, 0.75**0.5]), (40, 60, 1))
     tilted["roughness"] = tilted["roughness"] + 0.25
@@ -98,9 +99,7 @@ def seen(report):
     hidden = ".tag, .divider, .cross { display: none !important } .sky { border-radius: 0 !important }"
     bare = {"do": "style", "content": hidden + ".stage:focus-within { outline: 0 !important } .bar3d { display: none }"}
     asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
-    maps = [
-        step for name in ("albedo", "roughness", "metallic", "normals") for step in (choose(name), part(name, object_))
-    ]
+    maps = [step for name in CHANNELS[1:] for step in (choose(name), part(name, object_))]
     chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
     steps = [
         {"do": "size", "width": 700, "height": 600},
@@ -228,6 +227,7 @@ def test_the_asset_turns_up_in_each_channel(seen):
     assert middle(pictures["albedo"]) == pytest.approx(albedo, abs=0.02)
     assert middle(pictures["roughness"]) == pytest.approx([0.25] * 3, abs=0.02)
     assert middle(pictures["metallic"]) == pytest.approx([0.0] * 3, abs=0.02)
+    assert middle(pictures["occlusion"]) == pytest.approx([0.8] * 3, abs=0.02)
     front = np.float32([0, -np.cos(np.radians(20)), np.sin(np.radians(20))]) / 2 + 0.5
     assert middle(pictures["normals"]) == pytest.approx(front, abs=0.02)
     shaded = middle(pictures["shaded"])

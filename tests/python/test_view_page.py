@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from looking_at import keys, look_at, needs_chromium, serving
+from looking_at import keys, look_at, needs_chromium, serving, wait
 from looking_at import picture as picture_at
 from painted_ball import lamps, looking, with_textures
 from PIL import Image
@@ -63,7 +63,7 @@ def seen(run):
         return picture_at(folder / f"{name}.png")
 
     said = {"do": "text", "script": "document.getElementById('said').textContent"}
-    names = ("albedo", "roughness", "metallic", "normals")
+    names = ("albedo", "roughness", "metallic", "normals", "occlusion")
     background, lit = "document.querySelector('[name=background]')", "document.querySelector('[name=light]')"
     linked = "HTMLAnchorElement.prototype.click = function () { window.saved = this.download; }"
     steps = [
@@ -121,6 +121,13 @@ def seen(run):
         picture("home"),
         {"do": "drag", "from": [80, 80], "to": [110, 80]},
         picture("dragged"),
+        *keys("r"),
+        *(
+            {"do": "key", "key": "a", "restless": True},
+            wait("performance.now() > (window.spun ??= performance.now()) + 1000"),
+        ),
+        *keys("a"),
+        picture("spun"),
         *keys("r"),
         {"do": "drop", "path": str(folder / "red.hdr")},
         picture("red"),
@@ -290,6 +297,7 @@ def test_maps_show_their_numbers(seen):
     assert middle(pictures["albedo"]) == pytest.approx([float(linear_to_srgb(np.float32([0.4]))[0])] * 3, abs=0.01)
     assert middle(pictures["roughness"]) == pytest.approx([0.4] * 3, abs=0.01)
     assert middle(pictures["metallic"]) == pytest.approx([0] * 3, abs=0.01)
+    assert middle(pictures["occlusion"]) == pytest.approx([1] * 3, abs=0.01)  # the file holds none
     # The middle of the ball looks at the camera: from the front (-y), from 20 degrees above.
     towards = np.array([0, -np.cos(np.radians(20)), np.sin(np.radians(20))])
     assert middle(pictures["normals"]) == pytest.approx(0.5 * towards + 0.5, abs=0.02)
@@ -345,7 +353,7 @@ def test_keys_and_the_pointer_move_what_they_say(seen):
     before = middle(pictures["shaded"])
     brighter = middle(pictures["brighter"])
     assert (brighter > before + 0.03).all()
-    for name in ("neutral", "agx", "moved", "dragged"):
+    for name in ("neutral", "agx", "moved", "dragged", "spun"):
         assert np.abs(pictures[name] - pictures["shaded"]).mean() > 0.01, name
     assert np.abs(pictures["home"] - pictures["shaded"]).max() < 0.02
 

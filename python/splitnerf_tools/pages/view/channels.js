@@ -1,7 +1,7 @@
 // What is shown of a surface: three's shading, or one of its maps instead.
 import * as THREE from "three";
 
-export const CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals"];
+export const CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals", "occlusion"];
 
 // After three's tone mapping and sRGB curve: maps are shown as they are. Normals are those of the world, z up.
 const SHOWN = /* glsl */ `
@@ -9,6 +9,10 @@ if (channel == 1) gl_FragColor = sRGBTransferOETF(vec4(diffuseColor.rgb, 1.0));
 if (channel == 2) gl_FragColor = vec4(vec3(roughnessFactor), 1.0);
 if (channel == 3) gl_FragColor = vec4(vec3(metalnessFactor), 1.0);
 if (channel == 4) gl_FragColor = vec4(0.5 * (inverse(mat3(viewMatrix)) * normal) + 0.5, 1.0);
+#ifndef USE_AOMAP
+float ambientOcclusion = 1.0;
+#endif
+if (channel == 5) gl_FragColor = vec4(vec3(ambientOcclusion), 1.0);
 `;
 
 // The whole texture, its first row at the top, in place of what the camera sees. It is seen from behind, as v runs down.

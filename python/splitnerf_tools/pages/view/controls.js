@@ -5,7 +5,7 @@ import { element } from "./elements.js";
 const TONES = { none: "none", neutral: "neutral", agx: "AgX" };
 const STEP = Math.PI / 36; // radians of the camera a key
 const KEYS = { // of each control, and of what has none
-  channel: ["1 – 5", "what is shown"],
+  channel: ["1 – 6", "what is shown"],
   unfolded: ["u", "as textures"],
   wireframe: ["w", "wireframe"],
   turn: ["[ ]", "turn the light"],
@@ -13,6 +13,7 @@ const KEYS = { // of each control, and of what has none
   tone: ["t", "tone mapping"],
   ground: ["g", "ground shadow"],
   background: ["b", "light as background"],
+  spin: ["a", "turn about the object"],
   home: ["r", "front view"],
   save: ["s", "save picture"],
   full: ["x", "full screen"],
@@ -66,7 +67,7 @@ export class Controls {
     form.classList.add("controls");
     form.append(
       element("fieldset", { class: "pills", "aria-label": "What is shown" }, ...pills),
-      element("div", { class: "pair" }, check("wireframe", "Wireframe"), check("unfolded", "As textures")),
+      element("div", { class: "pair" }, check("wireframe", "Wireframe"), check("unfolded", "As textures"), check("spin", "Turntable")),
       this.lit, ...last,
       element("div", { class: "pair" }, button("home", "Front view"), button("save", "Save picture"), button("full", "Full screen")),
       element("details", {}, element("summary", {}, "Keys"), element("dl", {}, ...Object.values(all).flatMap(([key, words]) => [element("dt", {}, key), element("dd", {}, words)]))));
@@ -156,6 +157,7 @@ export class Controls {
       t: step("tone", 1),
       b: toggle("background"),
       g: toggle("ground"),
+      a: toggle("spin"),
       u: toggle("unfolded"),
       w: toggle("wireframe"),
       r: () => viewer.home(),

@@ -27,6 +27,7 @@ export class Viewer extends EventTarget {
     this.boxes = [];
     this.through = null; // the photo's camera that is looked through
     this.factor = 1; // its exposure
+    this.spunAt = 0;
     this.bar = element("div", { class: "bar3d", title: "a length at the object's middle, in the units of the data" });
     canvas.after(this.bar);
     this.home();
@@ -84,6 +85,7 @@ export class Viewer extends EventTarget {
   /** Sets what all assets share: the names are those of the panel's fields. */
   set(values) {
     this.values = values;
+    this.controls.autoRotate = values.spin;
     this.renderer.toneMapping = TONES[values.tone];
     for (const view of this.views) view.set(values);
     this.draw();
@@ -100,6 +102,7 @@ export class Viewer extends EventTarget {
   drawNow() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!width || !height) return;
+    this.spin();
     const size = this.renderer.getSize(new THREE.Vector2());
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false);
@@ -119,6 +122,13 @@ export class Viewer extends EventTarget {
     this.measure();
     this.dispatchEvent(new Event("drawn"));
     if (more.some(Boolean)) this.draw();
+  }
+
+  /** Turns on by the time that went by, where that is wanted, and so asks for the next picture. */
+  spin() {
+    const now = performance.now();
+    if (this.controls.autoRotate && !this.through) this.controls.update(Math.min((now - this.spunAt) / 1000, 1));
+    this.spunAt = now;
   }
 
   /** The scale bar: 1, 2 or 5 times a power of ten. */
