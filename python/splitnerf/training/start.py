@@ -33,6 +33,7 @@ HELD_UNTIL = 0.7  # share of the run until which the surface is held near the st
 SHAPE_WEIGHT = 15.0  # of the distances from the shape
 FREE_CELLS = 0.5  # distance from the shape that costs nothing, in cells
 NEAR_CELLS = 4.0  # from the surface to the points at which the field is compared with it
+CENTRES = 0.2  # cells by which the nearest centre on the other side is farther than the surface, on average
 POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
@@ -203,8 +204,8 @@ def surface_depths(distances: Tensor, box: float, photos: GreyPhotos) -> Tensor:
 
 
 def exact_distances(distances: Tensor, box: float) -> Tensor:
-    """[r, r, r] the distances to the nearest vertex of the zero level of truncated ones, negative inside. Bodies under a
-    fiftieth of the largest one are left out."""
+    """[r, r, r] the distances to the nearest vertex of the zero level of truncated ones, negative inside; beyond
+    :data:`NEAR_CELLS` to the nearest cell of the other side. Bodies under a fiftieth of the largest one are left out."""
     solid = (distances < 0).cpu().numpy()
     bodies, n = ndimage.label(solid)
     if n > 1:
@@ -212,12 +213,12 @@ def exact_distances(distances: Tensor, box: float) -> Tensor:
         small = solid & ~np.isin(bodies, 1 + np.flatnonzero(sizes > 0.02 * sizes.max()))
         distances = torch.where(torch.from_numpy(small).to(distances.device), distances.abs(), distances)
         solid &= ~small
+    cell = 2 * box / len(solid)
+    away = cell * (np.where(solid, *map(ndimage.distance_transform_edt, (solid, ~solid))) - CENTRES)
+    near = away < (NEAR_CELLS + 1) * cell
     vertices, _ = surface_mesh(distances, box, 2 * len(distances))
-    axis = (np.arange(len(solid)) + 0.5) * (2 * box / len(solid)) - box
-    centres = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1)
-    away, _ = cKDTree(vertices).query(centres.reshape(-1, 3))
-    signed = np.where(solid, -1.0, 1.0) * away.reshape(solid.shape)
-    return torch.from_numpy(signed.astype(np.float32)).to(distances.device)
+    away[near], _ = cKDTree(vertices).query((np.argwhere(near) + 0.5) * cell - box)
+    return torch.from_numpy(np.where(solid, -away, away).astype(np.float32)).to(distances.device)
 
 
 def start_of(model: SceneModel, photos: Dataset, hull: Tensor, generator: torch.Generator) -> StartShape | None:
