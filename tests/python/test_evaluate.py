@@ -165,10 +165,10 @@ def test_table():
     assert [row[0] for row in cells] == ["scene", "---", "chair", "lego", "**mean**"]
     assert len({len(row) for row in cells}) == 1
     chair, lego, mean = (dict(zip(cells[0], row)) for row in cells[2:])
-    assert (chair["relight PSNR"], chair["relight SSIM"], chair["relight LPIPS"]) == ("27.13", "0.941", "-")
-    assert (chair["albedo PSNR"], lego["relight PSNR"], chair["time, min"]) == ("-", "-", "1.5")
-    assert (mean["novel view PSNR"], mean["normals, degrees"]) == ("32.00", "5.00")
-    assert (mean["relight PSNR"], mean["novel view LPIPS"], mean["albedo PSNR"]) == ("27.13 (1)", "0.050 (1)", "-")
+    assert (chair["relight, dB"], chair["relight, SSIM"], chair["relight, LPIPS"]) == ("27.13", "0.9412", "-")
+    assert (chair["albedo, dB"], lego["relight, dB"], chair["time, min"]) == ("-", "-", "1.5")
+    assert (mean["novel view, dB"], mean["normals, degrees"]) == ("32.00", "5.00")
+    assert (mean["relight, dB"], mean["novel view, LPIPS"], mean["albedo, dB"]) == ("27.13 (1)", "0.0500 (1)", "-")
     assert "mean" not in evaluation_table([("chair", FULL)])
 
 

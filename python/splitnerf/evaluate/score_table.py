@@ -1,39 +1,53 @@
-"""Evaluations of several runs as one markdown table."""
+"""The scores of an evaluation as columns, and several evaluations as one markdown table."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-GROUPS = (("relight", "relight"), ("albedo", "albedo"), ("novel_view", "novel view"))
-SCORES = (("psnr", "PSNR", "{:.2f}"), ("ssim", "SSIM", "{:.3f}"), ("lpips", "LPIPS", "{:.3f}"))
+# Name, title, format, and keys in evaluation.json.
 COLUMNS = (
-    ("normal_mae_deg", "normals, degrees", "{:.2f}"),
-    ("roughness_mae", "roughness, error", "{:.3f}"),
-    ("metallic_balanced_accuracy", "metallic, accuracy", "{:.3f}"),
-    ("light_psnr", "light, PSNR", "{:.2f}"),
-    ("chamfer", "chamfer", "{:.4f}"),
-    ("f_score", "F", "{:.3f}"),
-    ("seconds", "time, min", "{:.1f}"),
+    *(
+        (name + end, f"{title}, {unit}", text, (name, measure))
+        for name, title in (("relight", "relight"), ("albedo", "albedo"), ("novel_view", "novel view"))
+        for end, unit, text, measure in (
+            ("", "dB", "{:.2f}", "psnr"),
+            ("_ssim", "SSIM", "{:.4f}", "ssim"),
+            ("_lpips", "LPIPS", "{:.4f}", "lpips"),
+        )
+    ),
+    ("normals", "normals, degrees", "{:.2f}", ("normal_mae_deg",)),
+    ("roughness", "roughness, error", "{:.3f}", ("roughness_mae",)),
+    ("metallic", "metallic, accuracy", "{:.3f}", ("metallic_balanced_accuracy",)),
+    ("light", "light, dB", "{:.2f}", ("light_psnr",)),
+    ("chamfer", "chamfer", "{:.4f}", ("chamfer",)),
+    ("f_score", "F-score", "{:.3f}", ("f_score",)),
+    ("minutes", "time, min", "{:.1f}", ("seconds",)),
 )
+
+
+def value_at(evaluation: object, keys: Sequence[str]) -> float | None:
+    """A number of an evaluation.json by its keys; None where there is none."""
+    for key in keys:
+        evaluation = evaluation.get(key) if isinstance(evaluation, dict) else None
+    return float(evaluation) if isinstance(evaluation, (int, float)) else None
+
+
+def values_of(evaluation: dict) -> dict[str, float | None]:
+    """The columns of an evaluation.json by name; None where the data have no truth."""
+    values = {name: value_at(evaluation, keys) for name, _, _, keys in COLUMNS}
+    seconds = values["minutes"]
+    return values | {"minutes": None if seconds is None else seconds / 60}
 
 
 def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
     """Markdown with a row per name and evaluation and, for more than one, their mean. A missing value is '-'; a mean is
     over the scenes that have the value, and is marked with their number where it is not all."""
-    header, formats = ["scene"], []
-    for _, group in GROUPS:
-        for _, score, text in SCORES:
-            header.append(f"{group} {score}")
-            formats.append(text)
-    for _, title, text in COLUMNS:
-        header.append(title)
-        formats.append(text)
-    rows = [(name, _values(evaluation)) for name, evaluation in evaluations]
-    lines = [header, ["---"] + ["---:"] * len(formats)]
-    lines += [[name] + [_cell(value, text) for value, text in zip(values, formats)] for name, values in rows]
+    rows = [(name, values_of(evaluation)) for name, evaluation in evaluations]
+    lines = [["scene", *(title for _, title, *_ in COLUMNS)], ["---"] + ["---:"] * len(COLUMNS)]
+    lines += [[name] + [_cell(values[key], text) for key, _, text, _ in COLUMNS] for name, values in rows]
     if len(rows) > 1:
-        lines.append(["**mean**"] + [_mean([v[i] for _, v in rows], text) for i, text in enumerate(formats)])
+        lines.append(["**mean**"] + [_mean([v[key] for _, v in rows], text) for key, _, text, _ in COLUMNS])
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
@@ -41,14 +55,6 @@ def holds_table(path: Path) -> bool:
     """Whether a file is a table of scores."""
     with open(path, "rb") as file:
         return file.read(9) == b"| scene |"
-
-
-def _values(evaluation: dict) -> list[float | None]:
-    values = [(evaluation.get(group) or {}).get(score) for group, _ in GROUPS for score, *_ in SCORES]
-    for key, *_ in COLUMNS:
-        value = evaluation.get(key)
-        values.append(value / 60 if key == "seconds" and value is not None else value)
-    return values
 
 
 def _cell(value: float | None, text: str) -> str:

@@ -31,7 +31,7 @@ from splitnerf.data.truth import (
 from splitnerf.errors import InputError
 from splitnerf.evaluate.lpips import Distance, find_distance
 from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, scaled_scores
-from splitnerf.evaluate.score_table import COLUMNS, GROUPS, SCORES
+from splitnerf.evaluate.score_table import COLUMNS
 from splitnerf.progress import tracked
 from splitnerf.render.model import ENVIRONMENT_ROWS, SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
@@ -328,10 +328,14 @@ def holds_evaluation(path: Path) -> bool:
 
 def is_evaluation(content: dict) -> bool:
     """Whether contents of a file are scores as an evaluation writes them."""
-    groups = [content.get(key) for key, _ in GROUPS]
-    numbers = [content.get(key) for key, *_ in COLUMNS]
-    for group in groups:
-        if group is not None and not (isinstance(group, dict) and {key for key, *_ in SCORES} <= group.keys()):
+    if "novel_view" not in content:
+        return False
+    for *_, (group, *measure) in COLUMNS:
+        value = content.get(group)
+        if measure and value is not None:
+            if not isinstance(value, dict) or measure[0] not in value:
+                return False
+            value = value[measure[0]]
+        if type(value) not in (int, float, type(None)):
             return False
-        numbers += [group[key] for key, *_ in SCORES] if group else []
-    return "novel_view" in content and all(type(number) in (int, float, type(None)) for number in numbers)
+    return True

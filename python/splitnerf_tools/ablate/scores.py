@@ -8,27 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from splitnerf.evaluate.score_table import COLUMNS, values_of
 
 from splitnerf_tools.ablate.rows import FULL
 
 CLOSE = 0.3  # dB: a smaller difference of single runs is not significant
-# Name, title, format, and keys in evaluation.json.
-COLUMNS = (
-    *(
-        (name + end, f"{title}, {unit}", text, (name, measure))
-        for name, title in (("relight", "relight"), ("albedo", "albedo"), ("novel_view", "novel view"))
-        for end, unit, text, measure in (
-            ("", "dB", "{:.2f}", "psnr"),
-            ("_ssim", "SSIM", "{:.4f}", "ssim"),
-            ("_lpips", "LPIPS", "{:.4f}", "lpips"),
-        )
-    ),
-    ("normals", "normals, degrees", "{:.2f}", ("normal_mae_deg",)),
-    ("roughness", "roughness, error", "{:.3f}", ("roughness_mae",)),
-    ("metallic", "metallic, accuracy", "{:.3f}", ("metallic_balanced_accuracy",)),
-    ("light", "light, dB", "{:.2f}", ("light_psnr",)),
-    ("minutes", "time, min", "{:.1f}", ("seconds",)),
-)
 
 
 @dataclass(frozen=True)
@@ -65,18 +49,9 @@ class Difference:
         return f"no difference ({text})" if abs(self.mean) < 2 * self.error else text
 
 
-def value_at(evaluation: object, keys: Sequence[str]) -> float | None:
-    """A number of an evaluation.json by its keys; None where there is none."""
-    for key in keys:
-        evaluation = evaluation.get(key) if isinstance(evaluation, dict) else None
-    return float(evaluation) if isinstance(evaluation, (int, float)) else None
-
-
 def score_of(scene: str, row: str, reference: str, seed: int, evaluation: dict) -> Score:
     """The columns of an evaluation.json."""
-    values = {name: value_at(evaluation, keys) for name, _, _, keys in COLUMNS}
-    seconds = values["minutes"]
-    return Score(scene, row, seed, values | {"minutes": None if seconds is None else seconds / 60}, reference)
+    return Score(scene, row, seed, values_of(evaluation), reference)
 
 
 def differences(scores: Sequence[Score], scene: str) -> list[Difference]:

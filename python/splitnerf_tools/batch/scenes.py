@@ -10,9 +10,8 @@ from pathlib import Path
 
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError, plain
+from splitnerf.evaluate.score_table import value_at
 from splitnerf.files import LOCK, atomic_path
-
-from splitnerf_tools.ablate.scores import value_at
 
 STATE, TABLE, LOGS = "batch.json", "batch.md", "logs"  # in the batch's folder, beside the runs
 FORMAT = 1
