@@ -89,7 +89,7 @@ class SurfaceSettings:
     table_dtype: str = setting(
         "float32",
         "number format in which the hash table is read; it is trained in float32",
-        choices=("float32", "float16", "bfloat16"),
+        choices=("float32", "float16"),
     )
     start: str = setting(
         "stereo",
