@@ -111,7 +111,7 @@ def annealed(anneal: float, dtype: torch.dtype) -> tuple:
 OTHERS = [
     *(
         ("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
-        for mode in (0, 1, 2)
+        for mode in (0, 1)
         for gain in (False, True)
     ),
     ("light_queries", lambda t: query_inputs("cpu", t, False, 300)),
@@ -122,7 +122,7 @@ OTHERS = [
     ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
     ("summed_light", lambda t: shared_inputs(700, dtype=t)),
     *(
-        ("split_sum_shade", lambda t, channels=channels: indirect_inputs(t, 2, channels, 40, stacked=True))
+        ("split_sum_shade", lambda t, channels=channels: indirect_inputs(t, 1, channels, 40, stacked=True))
         for channels in (1, 3)
     ),
     ("cached_visibility", far_points),

@@ -138,8 +138,8 @@ class ShadingSettings:
     fresnel: str = setting(
         "exact",
         "form of the Fresnel term; exact: the path tracer's and Blender's, Schlick's for metals and the exact one of "
-        "index 1.5 for dielectrics; paper, code: as published, as released",
-        choices=("exact", "paper", "code"),
+        "index 1.5 for dielectrics; paper: as published",
+        choices=("exact", "paper"),
     )
     query: str = setting(
         "mean",
