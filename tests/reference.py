@@ -177,16 +177,14 @@ def gain(f0: Tensor | float, f1: Tensor, f2: Tensor, compensate: bool) -> Tensor
 
 def split_sum_shade(normals, view_dirs, albedo, roughness, metallic, specular, diffuse, *occlusion_and_rest) -> Tensor:
     """(1 - metallic) kept albedo (o_d L_d + I_d) + E (o_s L_s + I_s). Mode exact: E of metal and dielectric, mixed, and
-    the dielectric's 1 - E; paper and code: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds L_s of all and
-    then L_d."""
+    the dielectric's 1 - E; paper: E = F F1 + F2 and 1 - F. Without `diffuse`, `specular` holds both, L_s first."""
     occlusion_s, occlusion_d, lut, mode, compensate, *indirect = occlusion_and_rest
     indirect_s, indirect_d = indirect or (None, None)
     _, cosine = facing(normals, view_dirs)
     f1, f2, _, layer = brdf_table(lut, cosine, roughness).split(1, 1)
     if mode:
         f0 = 0.04 * (1 - metallic) + metallic * albedo
-        edge = 1 - roughness if mode == 1 else torch.maximum(1 - roughness, f0)
-        fresnel = f0 + (edge - f0) * (1 - cosine) ** 5
+        fresnel = f0 + (1 - roughness - f0) * (1 - cosine) ** 5
         energy, kept = (fresnel * f1 + f2) * gain(fresnel, f1, f2, compensate), 1 - fresnel
     else:
         coat = layer * gain(0.04, f1, f2, compensate)

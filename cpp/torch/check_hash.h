@@ -23,11 +23,7 @@ inline int64_t n_entries(const HashGridShape& shape) {
   return hash_levels(shape, levels.data());
 }
 
-inline bool is_16_bit(const Tensor& t) {
-  return t.scalar_type() == ScalarType::Half || t.scalar_type() == ScalarType::BFloat16;
-}
-
-// A hash grid's table, and what is computed with: for one of 16 bits float32.
+// A hash grid's table, and what is computed with: for one of float16 float32.
 struct Table {
   HashGridShape shape;
   Kind type;
@@ -43,9 +39,9 @@ struct Table {
 
   // Reads another tensor of the same shape in place of the table.
   void read(const char* op, const Tensor& stored) {
-    require(type == ScalarType::Float && is_16_bit(stored), op,
-            "stored must be float16 or bfloat16 beside a float32 table, got " + describe(stored.scalar_type()) +
-                " beside " + describe(type));
+    require(type == ScalarType::Float && stored.scalar_type() == ScalarType::Half, op,
+            "stored must be float16 beside a float32 table, got " + describe(stored.scalar_type()) + " beside " +
+                describe(type));
     entries = checked(op, "stored", stored, {n_entries(shape), shape.n_features}, type.with(stored.scalar_type()));
   }
 
@@ -53,8 +49,6 @@ struct Table {
     switch (entries.scalar_type()) {
       case ScalarType::Half:
         return in<Half>(entries);
-      case ScalarType::BFloat16:
-        return in<Bfloat16>(entries);
       case ScalarType::Float:
         return in<float>(entries);
       default:
@@ -68,10 +62,10 @@ struct Table {
     return table.size(1);
   }
   static Kind compute_kind(const char* op, const Tensor& table) {
-    if (is_16_bit(table)) return {ScalarType::Float, table.device()};
     const ScalarType type = table.scalar_type();
+    if (type == ScalarType::Half) return {ScalarType::Float, table.device()};
     require(type == ScalarType::Float || type == ScalarType::Double, op,
-            "table must be float32, float64, float16 or bfloat16, got " + describe(type));
+            "table must be float32, float64 or float16, got " + describe(type));
     return {type, table.device()};
   }
 };

@@ -48,21 +48,14 @@ AdamwBody<T> step_of(const char* op, Tensor& param, const Tensor& grad, Tensor& 
   in_range("beta2", all.beta2 >= 0 && all.beta2 < 1, "in [0, 1)", all.beta2);
   in_range("weight_decay", weight_decay >= 0, "at least 0", weight_decay);
   require(step >= 1, op, "step must be at least 1, got " + std::to_string(step));
-  const ScalarType copied = copy ? copy->scalar_type() : ScalarType::Half;
-  require(copied == ScalarType::Half || copied == ScalarType::BFloat16, op,
-          "copy must be float16 or bfloat16, got " + describe(copied));
-  AdamwArrays<T> x{param.numel(),
-                   param.dim() ? param.size(param.dim() - 1) : 1,
-                   sparse,
-                   written<T>(op, "param", param, param, kind),
-                   in<T>(grad),
-                   written<T>(op, "exp_avg", exp_avg, param, kind),
-                   written<T>(op, "exp_avg_sq", exp_avg_sq, param, kind),
-                   nullptr,
-                   nullptr};
-  if (copy && copied == ScalarType::Half) x.half = written<Half>(op, "copy", *copy, param, kind.with(copied));
-  if (copy && copied == ScalarType::BFloat16)
-    x.bfloat16 = written<Bfloat16>(op, "copy", *copy, param, kind.with(copied));
+  const AdamwArrays<T> x{param.numel(),
+                         param.dim() ? param.size(param.dim() - 1) : 1,
+                         sparse,
+                         written<T>(op, "param", param, param, kind),
+                         in<T>(grad),
+                         written<T>(op, "exp_avg", exp_avg, param, kind),
+                         written<T>(op, "exp_avg_sq", exp_avg_sq, param, kind),
+                         copy ? written<Half>(op, "copy", *copy, param, kind.with(ScalarType::Half)) : nullptr};
   return {AdamwRule<T>(lr, all.beta1, all.beta2, all.eps, weight_decay, step), x};
 }
 Tensor dense_gradient(const char* op, const Tensor& grad, const Tensor& param, const Kind& kind) {

@@ -59,7 +59,7 @@ struct Field {
         weights(op, n_levels * table.shape.n_features, hidden, hidden_bias, out, out_bias, beta, box),
         type(weights.type) {
     require(table.type.type == type.type && table.type.device == type.device, op,
-            "table must be " + describe(type) + (type == ScalarType::Float ? ", float16 or bfloat16" : "") + " on " +
+            "table must be " + describe(type) + (type == ScalarType::Float ? " or float16" : "") + " on " +
                 describe(type.device) + " as hidden is, got " + describe(table.entries.scalar_type()) + " on " +
                 describe(table.type.device));
   }

@@ -48,8 +48,8 @@ std::tuple<Tensor, Tensor> light_queries_backward(Tensor normals, Tensor view_di
 }
 
 ShadeOptions checked_options(const char* op, int64_t fresnel_mode, bool compensate) {
-  require(fresnel_mode >= 0 && fresnel_mode <= 2, op,
-          "fresnel_mode must be 0 (exact), 1 (paper) or 2 (code), got " + std::to_string(fresnel_mode));
+  require(fresnel_mode == 0 || fresnel_mode == 1, op,
+          "fresnel_mode must be 0 (exact) or 1 (paper), got " + std::to_string(fresnel_mode));
   return {static_cast<FresnelMode>(fresnel_mode), compensate};
 }
 

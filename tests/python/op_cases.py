@@ -279,7 +279,7 @@ CASES = {
     "light_queries": lambda t: query_inputs("cpu", t, True, 300),
     "light_queries_backward": lambda t: with_gradients("light_queries", query_inputs("cpu", t, True, 300)),
     "split_sum_shade": indirect_inputs,
-    "split_sum_shade_backward": lambda t: with_gradients("split_sum_shade", indirect_inputs(t, 2, 1, stacked=True)),
+    "split_sum_shade_backward": lambda t: with_gradients("split_sum_shade", indirect_inputs(t, 1, 1, stacked=True)),
     "prefilter_light": lambda t: prefilter_inputs("cpu", t, 100, 900),
     "prefilter_light_backward": lambda t: prefilter_backward_inputs("cpu", t),
     "sample_ggx_lobe": lambda t: (*prefilter_inputs("cpu", t, 50)[:2], 70, 3),

@@ -159,7 +159,7 @@ def test_settings_cannot_change_in_place():
         ),
         ({"occlusion.kind": "off"}, "shading.method = summed needs"),
         ({"shading.compositing": "srgb"}, "shading.method = summed needs"),
-        ({"shading.fresnel": "code"}, "shading.method = summed needs"),
+        ({"shading.fresnel": "paper"}, "shading.method = summed needs"),
         (
             {"constants.occlusion_directions": 224},
             "shading.method = summed needs occlusion.kind = bits with at least 256 constants.occlusion_directions",
@@ -190,7 +190,7 @@ def test_what_cannot_be_is_said_in_one_line(settings, message):
             "shading.method": "split",
             "occlusion.kind": "bits",
             "constants.occlusion_directions": 64,
-            "shading.fresnel": "code",
+            "shading.fresnel": "paper",
         },
     ],
 )

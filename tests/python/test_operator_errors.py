@@ -61,7 +61,7 @@ ERRORS = [
     ("interpolate", 1, lambda first: first + 9, "first must be in [0, 5)"),
     ("interpolate", 2, lambda second: second - 9, "second must be in [0, 5)"),
     ("split_sum_shade", 6, lambda diffuse: None, "specular must be [600, 3] float32"),
-    ("split_sum_shade", 10, lambda mode: 3, "fresnel_mode must be 0 (exact), 1 (paper) or 2 (code), got 3"),
+    ("split_sum_shade", 10, lambda mode: 2, "fresnel_mode must be 0 (exact) or 1 (paper), got 2"),
     ("light_queries", 3, lambda lut: lut[1:], "lut must be [32, 32, 4]"),
     ("shade_sums", 9, lambda share: None, "both or neither"),
     ("summed_light", 7, without, "sent must hold as many points as normals, or none"),

@@ -114,20 +114,19 @@ def test_the_ends_of_the_range(device):
 
 
 @each_device
-@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16], ids=["float16", "bfloat16"])
-def test_a_copy_is_rounded_as_torch_rounds_and_never_infinite(device, dtype):
+def test_a_copy_is_rounded_as_torch_rounds_and_never_infinite(device):
     """At a rate of 0, on numbers of all magnitudes, and on those halfway between two of the copy's."""
     bits = torch.randint(-(2**31), 2**31, (100_000,), generator=generator()).to(torch.int32)
-    bits[::4] &= -0x1000 if dtype == torch.float16 else -0x8000
+    bits[::4] &= -0x1000
     bits[1::4] = 0x33000000 + bits[1::4].remainder(0x17000000)  # what float16 has numbers for
     bits[2::4] = 0x33000000 + (bits[2::4].remainder(0x17000000) & -0x1000)
     param = bits.view(torch.float32).clone()
     param[:6] = torch.tensor([65504.0, 65520.0, 1e30, math.inf, -math.inf, math.nan])
     param, zeros = param.to(device), torch.zeros(len(param), device=device)
-    copy = rounded(param, dtype) * 0
+    copy = rounded(param) * 0
     tensors = [param], [torch.ones_like(zeros)], [zeros], [zeros.clone()]
     lib.adamw_steps_(*tensors, [0.0], 0.9, 0.99, 1e-8, [0.0], [1], [False], [copy], [0])
-    torch.testing.assert_close(copy, rounded(param, dtype), rtol=0, atol=0, equal_nan=True)
+    torch.testing.assert_close(copy, rounded(param), rtol=0, atol=0, equal_nan=True)
     assert not copy.isinf().any() and copy[5].isnan()
 
 
@@ -307,7 +306,7 @@ WRONG = [
     (8, [0.0, -1.0], "weight_decay"),
     (9, [1, 0], "step must be at least 1, got 0"),
     (10, [True], "sparse must hold 2, got 1"),
-    (11, [FOUR], "copy", "float16 or bfloat16", "float32"),
+    (11, [FOUR], "copy must be [4] float16", "float32"),
     (11, [torch.ones(3).half()], "copy must be [4] float16", "[3]"),
     (12, [2], "copied must hold positions in params"),
     (12, [0, 1], "copied must hold 1, got 2"),

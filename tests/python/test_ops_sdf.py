@@ -233,10 +233,9 @@ def test_only_the_length_of_a_row_has_a_length():
         torch.testing.assert_close(along, torch.zeros_like(along), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
-def test_field_reads_the_copy_of_the_table(dtype):
+def test_field_reads_the_copy_of_the_table():
     inputs = sdf_field_inputs(70, torch.float32)
-    stored = inputs[1].to(dtype)
+    stored = inputs[1].half()
     got = gradients(lambda *x: lib.sdf_field(*x, stored), inputs)
     expected = gradients(lib.sdf_field, (inputs[0], stored.float(), *inputs[2:]))
     for a, b in zip([*got[0], *got[1]], [*expected[0], *expected[1]]):
@@ -248,7 +247,7 @@ def test_field_reads_the_copy_of_the_table(dtype):
         lib.sdf_field(*inputs, leaf)[0].sum().backward()
     with pytest.raises(RuntimeError, match="no gradient to a table of"):
         lib.sdf_field(inputs[0], leaf, *inputs[2:])[0].sum().backward()
-    with pytest.raises(Exception, match="sdf_field: stored must be float16 or bfloat16"):
+    with pytest.raises(Exception, match="sdf_field: stored must be float16 beside"):
         lib.sdf_field(*sdf_field_inputs(3), stored)
 
 

@@ -78,7 +78,7 @@ def test_light_of_the_object_itself_comes_in_where_the_sky_does_not():
 
 # ---- Fresnel's term ----
 
-MODES = {"exact": 0, "paper": 1, "code": 2}  # by their numbers in the reference
+MODES = {"exact": 0, "paper": 1}  # by their numbers in the reference
 
 
 @pytest.mark.parametrize(("mode", "compensate"), [*((mode, True) for mode in MODES), ("exact", False)])

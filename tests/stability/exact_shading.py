@@ -43,11 +43,6 @@ def light_queries(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
     return {"mean": [x / size if size > 1e-10 else x * 0 for x in mean], "reflection": mirror}
 
 
-def fresnel(mode: str, f0, roughness, cosine):
-    edge = {"paper": 1 - roughness, "code": max(1 - roughness, f0)}[mode]
-    return f0 + (edge - f0) * clipped(1 - cosine, 0, 1) ** 5
-
-
 def gain(f0, f1, f2, compensated: bool):
     return 1 + f0 * (1 / (f1 + f2) - 1) if compensated else mp.mpf(1)
 
@@ -62,11 +57,12 @@ def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]
     f1, f2, _, layer = table(cosine, roughness)
     names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d", "indirect_s", "indirect_d")
     out: dict[str, list] = {}
-    for mode in ("exact", "paper", "code", "compensated"):
+    for mode in ("exact", "paper", "compensated"):
         out[mode] = []
         for albedo, l_s, l_d, o_s, o_d, i_s, i_d in zip(*(vector(row[name]) for name in names)):
-            if mode in ("paper", "code"):
-                f = fresnel(mode, mp.mpf("0.04") * (1 - metallic) + metallic * albedo, roughness, cosine)
+            if mode == "paper":
+                f0 = mp.mpf("0.04") * (1 - metallic) + metallic * albedo
+                f = f0 + (1 - roughness - f0) * clipped(1 - cosine, 0, 1) ** 5
                 energy, kept = f * f1 + f2, 1 - f
             else:
                 coat = layer * gain(mp.mpf("0.04"), f1, f2, mode == "compensated")

@@ -1,7 +1,6 @@
 """Entries of the operators of the distance field: hash grid and network."""
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 
 import torch
@@ -37,16 +36,12 @@ def encoded(rows: Rows, shared: Rows) -> Rows:
     return {"features": ops.hash_encode(rows["positions"], shared["table"], SPEC)}
 
 
-def from_16_bits(dtype: torch.dtype) -> Callable[[Rows, Rows], Rows]:
-    """:func:`encoded` with a table that is read in 16 bits; in float64, of the same numbers."""
-
-    def call(rows: Rows, shared: Rows) -> Rows:
-        table = shared["table"]
-        if table.dtype == torch.float32:
-            return {"features": ops.hash_encode(rows["positions"], table, SPEC, stored=rounded(table, dtype))}
-        return encoded(rows, {"table": table + (rounded(table, dtype).double() - table).detach()})
-
-    return call
+def from_16_bits(rows: Rows, shared: Rows) -> Rows:
+    """:func:`encoded` with a table that is read in float16; in float64, of the same numbers."""
+    table = shared["table"]
+    if table.dtype == torch.float32:
+        return {"features": ops.hash_encode(rows["positions"], table, SPEC, stored=rounded(table))}
+    return encoded(rows, {"table": table + (rounded(table).double() - table).detach()})
 
 
 def on_a_lattice(rows: Rows) -> Rows:
@@ -108,10 +103,7 @@ def grid_entry(name: str, call, dtype: torch.dtype = torch.float32) -> Entry:
 LEARNED = ("hidden", "hidden_length", "hidden_bias", "out", "out_length", "out_bias")
 ENTRIES = (
     grid_entry("hash_encode", encoded),
-    *(
-        grid_entry(f"hash_encode, {name}", from_16_bits(dtype), dtype)
-        for name, dtype in (("float16", torch.float16), ("bfloat16", torch.bfloat16))
-    ),
+    grid_entry("hash_encode, float16", from_16_bits, torch.float16),
     Entry(
         "sdf_field",
         draw=lambda draw, n: on_a_lattice({"positions": 2 * draw_positions(draw, n)["positions"] - 1}),

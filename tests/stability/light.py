@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import torch
 from splitnerf import ops
-from splitnerf.ops.light import SH_COEFFICIENTS
 from torch import Tensor
 
 from stability import exact_light
@@ -68,7 +67,7 @@ def pyramid() -> Rows:
     levels = draw.uniform(sum(r * r for r in RESOLUTIONS), 3)
     levels[5] = 1e6
     levels[300:310] = 0
-    sh = 0.1 * draw.normal(SH_COEFFICIENTS, 3)
+    sh = 0.1 * draw.normal(169, 3)  # degrees 0 to 12
     sh[0] = torch.tensor([4.0, 0.5, 1e-3])
     return {"levels": levels.float(), "sh": sh.float(), "zonal": ops.light.zonal_factors(NODES[-1], ZONAL_ROWS)}
 

@@ -129,4 +129,4 @@ change of the inputs; the columns "without condition" leave the latter out. The 
 promised error: an error just below that is an upper bound. The outputs of the worst thousand inputs were computed again in
 50 digits where the operator has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts
 rows with NaN or infinity where the truth has a float32, or whose truth is NaN. Tables of the hash
-grid may be float16 or bfloat16: compared with float64 on the same numbers. No other input may be: they raise."""
+grid may be float16: compared with float64 on the same numbers. No other input may be: they raise."""

@@ -13,9 +13,6 @@ namespace splitnerf {
 struct Half {  // IEEE 754 binary16
   uint16_t bits;
 };
-struct Bfloat16 {  // the upper half of a float32
-  uint16_t bits;
-};
 
 SPLITNERF_HD float float_of_bits(uint32_t bits) {
   float x;
@@ -34,7 +31,6 @@ inline constexpr uint32_t kRebias = (127u - 15u) << 23, kHalfOne = 0x3f000000u;
 // A stored number as the one to compute with: exact. Without branches, so that loops become vector code.
 SPLITNERF_HD float widen(float x) { return x; }
 SPLITNERF_HD double widen(double x) { return x; }
-SPLITNERF_HD float widen(Bfloat16 x) { return float_of_bits(static_cast<uint32_t>(x.bits) << 16); }
 SPLITNERF_HD float widen(Half x) {
 #ifdef __CUDA_ARCH__
   return __half2float(__ushort_as_half(x.bits));
@@ -48,15 +44,7 @@ SPLITNERF_HD float widen(Half x) {
 }
 
 // The stored number nearest to x, of two the even one; beyond the largest of them that one, never infinite. NaN stays NaN.
-template <class S> SPLITNERF_HD S narrow(float x);
-template <> SPLITNERF_HD Bfloat16 narrow<Bfloat16>(float x) {
-  constexpr uint32_t kLargest = 0x7f7f0000u;
-  const uint32_t bits = bits_of_float(x), sign = bits >> 16 & 0x8000u, magnitude = bits & 0x7fffffffu;
-  const uint32_t within = magnitude < kLargest ? magnitude : kLargest;
-  const uint32_t rounded = (within + 0x7fffu + (within >> 16 & 1u)) >> 16;
-  return {static_cast<uint16_t>(sign | (magnitude > 0x7f800000u ? 0x7fc0u : rounded))};
-}
-template <> SPLITNERF_HD Half narrow<Half>(float x) {
+SPLITNERF_HD Half narrow(float x) {
   constexpr uint32_t kLargest = 0x477fe000u, kSmallestNormal = 0x38800000u;
   const uint32_t bits = bits_of_float(x), sign = bits >> 16 & 0x8000u, magnitude = bits & 0x7fffffffu;
   const uint32_t within = magnitude < kLargest ? magnitude : kLargest;

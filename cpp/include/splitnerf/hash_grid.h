@@ -34,22 +34,18 @@ class HashTable {
   HashTable(std::nullptr_t = nullptr) {}
   HashTable(const float* entries) : entries_(entries) {}
   HashTable(const double* entries) : entries_(entries) {}
-  HashTable(const Half* entries) : entries_(entries), stored_(Stored::kHalf) {}
-  HashTable(const Bfloat16* entries) : entries_(entries), stored_(Stored::kBfloat16) {}
+  HashTable(const Half* entries) : entries_(entries), half_(true) {}
 
   // Calls body(entries) with the pointer that the table was made from; T is what is computed with.
   template <class T, class Body> void read_as(Body&& body) const {
-    if constexpr (std::is_same_v<T, float>) {
-      if (stored_ == Stored::kHalf) return body(static_cast<const Half*>(entries_));
-      if (stored_ == Stored::kBfloat16) return body(static_cast<const Bfloat16*>(entries_));
-    }
+    if constexpr (std::is_same_v<T, float>)
+      if (half_) return body(static_cast<const Half*>(entries_));
     body(static_cast<const T*>(entries_));
   }
 
  private:
-  enum class Stored { kReal, kHalf, kBfloat16 };
   const void* entries_ = nullptr;  // [n_entries, n_features]
-  Stored stored_ = Stored::kReal;
+  bool half_ = false;
 };
 
 // What is wrong with a shape, in words; empty for one that can be built.

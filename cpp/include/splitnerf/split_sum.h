@@ -161,8 +161,8 @@ SPLITNERF_HD QueryDirectionGrad<T> query_direction_backward(const float* lut, bo
 // ---- shading ---------------------------------------------------------------------------------
 
 // exact: a metal and a diffuse base under a dielectric layer, mixed: the path tracer's BSDF, principled.h.
-// paper, code: one Fresnel term of F0 = 0.04 (1 - m) + m albedo, counted twice, as published and as released.
-enum class FresnelMode : int { kExact = 0, kPaper = 1, kCode = 2 };
+// paper: one Fresnel term of F0 = 0.04 (1 - m) + m albedo, counted twice.
+enum class FresnelMode : int { kExact = 0, kPaper = 1 };
 
 struct ShadeOptions {
   FresnelMode fresnel = FresnelMode::kExact;
@@ -173,27 +173,24 @@ struct ShadeOptions {
 
 inline constexpr double kDielectricF0 = 0.04;
 
-// Reflectance at normal incidence of one channel in the modes paper and code.
+// Reflectance at normal incidence of one channel in the mode paper.
 template <class T> SPLITNERF_HD T normal_reflectance(T metallic, T albedo) {
   return T(kDielectricF0) * (T(1) - metallic) + metallic * albedo;
 }
 
-// Effective Fresnel colour Fr of one channel that multiplies F1, and its partial derivatives.
-//   paper: Fr = F0 + (1 - rho - F0)(1 - n.v)^5                     SplitNeRF Eq. (7)
-//   code:  Fr = F0 + (max(1 - rho, F0) - F0)(1 - n.v)^5            the released code
+// Effective Fresnel colour Fr = F0 + (1 - rho - F0)(1 - n.v)^5 of one channel that multiplies F1 in the mode paper, and its
+// partial derivatives. Source: SplitNeRF Eq. (7).
 template <class T> struct FresnelTerm {
   T value, d_f0, d_roughness, d_n_dot_v;
   T rest;  // 1 - Fr, which the difference would lose where both are close to 1
 };
-template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(FresnelMode mode, T f0, T roughness, T n_dot_v) {
+template <class T> SPLITNERF_HD FresnelTerm<T> fresnel_term(T f0, T roughness, T n_dot_v) {
   const T nv = clamp(n_dot_v, T(0), T(1)), c = T(1) - nv, c5 = pow5(c);
   const T inner = nv * (T(1) + c * (T(1) + c * (T(1) + c * (T(1) + c))));  // 1 - c^5
-  const T smooth = T(1) - roughness;
-  const bool floored = mode == FresnelMode::kCode && smooth < f0;
-  const T edge = (floored ? f0 : smooth) - f0;
+  const T edge = T(1) - roughness - f0;
   const bool nv_free = n_dot_v > T(0) && n_dot_v < T(1);
-  return {f0 + edge * c5, floored ? T(1) : inner, floored ? T(0) : -c5, nv_free ? T(-5) * edge * square(c * c) : T(0),
-          floored ? T(1) - f0 : (T(1) - f0) * inner + roughness * c5};
+  return {f0 + edge * c5, inner, -c5, nv_free ? T(-5) * edge * square(c * c) : T(0),
+          (T(1) - f0) * inner + roughness * c5};
 }
 
 // What multiple scattering adds to the specular lobe of one channel, a factor, and its partial derivatives by Fr, and
@@ -261,7 +258,7 @@ template <class T> SPLITNERF_HD ArrivingAt<T> arriving(const ShadePoint<T>& p, i
 
 // Of one channel: the albedo E of the specular lobe, and the share of light that it leaves to a diffuse base.
 //   exact: E = m E_m + (1 - m) E_d,  kept = 1 - E_d;  E_m = gain (albedo F1 + F2), E_d of the dielectric layer
-//   paper, code: E = gain (Fr F1 + F2),  kept = 1 - Fr
+//   paper: E = gain (Fr F1 + F2),  kept = 1 - Fr
 template <class T> struct ChannelAlbedo {
   T specular, kept;
 };
@@ -273,7 +270,7 @@ SPLITNERF_HD ChannelAlbedo<T> channel_albedo(ShadeOptions options, const LutSamp
     const DielectricAlbedo<T> layer = dielectric_albedo(table, options.compensate);
     return {metallic * metal.value + (T(1) - metallic) * layer.value, layer.rest};
   }
-  const FresnelTerm<T> fr = fresnel_term(options.fresnel, normal_reflectance(metallic, albedo), roughness, n_dot_v);
+  const FresnelTerm<T> fr = fresnel_term(normal_reflectance(metallic, albedo), roughness, n_dot_v);
   return {specular_albedo(fr.value, fr.rest, table, options.compensate).value, fr.rest};
 }
 
@@ -296,7 +293,7 @@ SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, 
             grad_metal * metal.d_lost + grad_layer * layer.d_lost,
             grad_layer * layer.gain.value};
   }
-  const FresnelTerm<T> fr = fresnel_term(options.fresnel, normal_reflectance(metallic, albedo), roughness, n_dot_v);
+  const FresnelTerm<T> fr = fresnel_term(normal_reflectance(metallic, albedo), roughness, n_dot_v);
   const SpecularAlbedo<T> e = specular_albedo(fr.value, fr.rest, table, options.compensate);
   const T grad_fr = grad.specular * e.d_fr - grad.kept, grad_f0 = grad_fr * fr.d_f0;
   return {grad_f0 * metallic,

@@ -55,14 +55,10 @@ template <class T> void step_rows(const AdamwRule<T>& rule, const AdamwArrays<T>
   }
 }
 
-template <class T> void write_copies(const AdamwArrays<T>& x, int64_t first, int64_t n) {
+template <class T> void write_copy(const AdamwArrays<T>& x, int64_t first, int64_t n) {
   const T* param = x.param + first;
-  if (x.half)
 #pragma omp simd
-    for (int64_t q = 0; q < n; ++q) x.half[first + q] = narrow<Half>(static_cast<float>(param[q]));
-  if (x.bfloat16)
-#pragma omp simd
-    for (int64_t q = 0; q < n; ++q) x.bfloat16[first + q] = narrow<Bfloat16>(static_cast<float>(param[q]));
+  for (int64_t q = 0; q < n; ++q) x.half[first + q] = narrow(static_cast<float>(param[q]));
 }
 
 }  // namespace
@@ -79,7 +75,7 @@ void adamw_step(const AdamwRule<T>& rule, const AdamwArrays<T>& x, int64_t first
     } else {
       step(rule, x, i, n);
     }
-    write_copies(x, i, n);
+    if (x.half) write_copy(x, i, n);
   }
 }
 

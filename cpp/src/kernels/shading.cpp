@@ -142,14 +142,8 @@ template <FresnelMode kMode, bool kCompensate> struct Constant {
   static constexpr bool compensate = kCompensate;
 };
 template <bool kCompensate, class Body> void with_mode(FresnelMode mode, Body&& body) {
-  switch (mode) {
-    case FresnelMode::kExact:
-      return body(Constant<FresnelMode::kExact, kCompensate>{});
-    case FresnelMode::kPaper:
-      return body(Constant<FresnelMode::kPaper, kCompensate>{});
-    case FresnelMode::kCode:
-      return body(Constant<FresnelMode::kCode, kCompensate>{});
-  }
+  if (mode == FresnelMode::kExact) return body(Constant<FresnelMode::kExact, kCompensate>{});
+  body(Constant<FresnelMode::kPaper, kCompensate>{});
 }
 template <class Body> void with_constant(ShadeOptions options, Body&& body) {
   options.compensate ? with_mode<true>(options.fresnel, body) : with_mode<false>(options.fresnel, body);

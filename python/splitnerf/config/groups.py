@@ -89,7 +89,7 @@ class SurfaceSettings:
     table_dtype: str = setting(
         "float32",
         "number format in which the hash table is read; it is trained in float32",
-        choices=("float32", "float16", "bfloat16"),
+        choices=("float32", "float16"),
     )
     start: str = setting(
         "stereo",
@@ -138,8 +138,8 @@ class ShadingSettings:
     fresnel: str = setting(
         "exact",
         "form of the Fresnel term; exact: the path tracer's and Blender's, Schlick's for metals and the exact one of "
-        "index 1.5 for dielectrics; paper, code: as published, as released",
-        choices=("exact", "paper", "code"),
+        "index 1.5 for dielectrics; paper: as published",
+        choices=("exact", "paper"),
     )
     query: str = setting(
         "mean",
@@ -314,7 +314,7 @@ class Constants:
     eikonal_points: int = number(256, at_most=1 << 20)  # uniform in the box, in addition to the rays' samples
     # consistency of the light as an MLP
     light_form: str = number("smooth_l1", choices=("square", "smooth_l1"))  # square: the paper; else the released code
-    light_set: str = number("fibonacci", choices=("fibonacci", "uniform", "uniform_and_queries"))  # likewise
+    light_set: str = number("fibonacci", choices=("fibonacci", "uniform"))  # uniform: the paper
     light_samples: int = number(2048, at_least=1)  # directions
     light_queries: int = number(512, at_least=1)
     light_lobe_below: float = number(0.15)  # roughness of lobes with directions of their own

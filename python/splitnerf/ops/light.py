@@ -101,9 +101,6 @@ register(
 register("sample_ggx_lobe", fake=lambda axes, roughness, n_samples, seed: axes.new_empty(axes.shape[0], n_samples, 3))
 
 
-SH_COEFFICIENTS = 169  # degrees 0 to 12
-
-
 class SparseRows(NamedTuple):
     """A sparse matrix by rows. Of one that F mirror images leave as it is, it holds one row of each F.
 

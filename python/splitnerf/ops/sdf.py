@@ -81,30 +81,30 @@ def hash_encode(
         positions: [n, 3] points, float32 or float64, in [0, 1]. A point outside is moved to the nearest point of the
             cube, and its gradient along the clamped axes is 0. A NaN coordinate gives NaN features.
         table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16
-            or bfloat16 with float32 positions.
+            with float32 positions.
         spec: The shape of the grid.
         n_active: The number of open levels, coarsest first; the columns of closed levels are 0 and cost nothing.
             Default: all.
-        stored: A copy of the float32 table in float16 or bfloat16, which is read instead of the table and converted to
-            float32; or None.
+        stored: A copy of the float32 table in float16, which is read instead of the table and converted to float32; or
+            None.
 
     Returns:
         [n, spec.n_outputs] features in the dtype of positions. Differentiable once in positions and table. The
         gradient of table has the table's dtype and is summed in it; with `stored` the rounding counts as the identity.
 
     Raises:
-        RuntimeError: `stored` or a 16-bit table requires a gradient; raised in the backward pass.
+        RuntimeError: `stored` or a float16 table requires a gradient; raised in the backward pass.
     """
     return lib.hash_encode(positions, table, *spec.arguments(spec.n_levels if n_active is None else n_active), stored)
 
 
-def rounded(table: Tensor, dtype: torch.dtype) -> Tensor:
-    """The table in 16 bits, rounded to nearest even.
+def rounded(table: Tensor) -> Tensor:
+    """The table in float16, rounded to nearest even.
 
-    A value beyond the largest number of the dtype (float16: 65504) becomes that number, never infinite. NaN stays NaN.
+    A value beyond the largest number, 65504, becomes that number, never infinite. NaN stays NaN.
     """
-    largest = torch.finfo(dtype).max
-    return table.detach().clamp(-largest, largest).to(dtype)
+    largest = torch.finfo(torch.float16).max
+    return table.detach().clamp(-largest, largest).half()
 
 
 _optimiser_steps = [0]  # steps of all optimisers of this process
@@ -117,20 +117,14 @@ def _count_step(optimiser, *_) -> None:
 
 
 class TableCopy:
-    """A 16-bit copy of a float32 table. :func:`rounded` renews the copy when the table may have changed.
+    """A float16 copy of a float32 table. :func:`rounded` renews the copy when the table may have changed.
 
     Two signs tell of a change: torch's version counter, and the step of any optimiser, since torch's fused optimisers
     do not increase the counter. A write through ``table.data`` or by an optimiser's function without its class is not
     noticed.
-
-    Args:
-        dtype: The dtype of the copy, torch.float16 or torch.bfloat16.
     """
 
-    def __init__(self, dtype: torch.dtype):
-        if dtype not in (torch.float16, torch.bfloat16):
-            raise ValueError(f"table_dtype must be torch.float16 or torch.bfloat16, got {dtype}")
-        self.dtype = dtype
+    def __init__(self):
         self._values: Tensor | None = None
         self._of: tuple | None = None
 
@@ -141,7 +135,7 @@ class TableCopy:
         """
         if self._state(table) != self._of:
             with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
-                values, kept = rounded(table, self.dtype), self._values
+                values, kept = rounded(table), self._values
                 alike = kept is not None and (kept.shape, kept.device) == (values.shape, values.device)
                 self._values, self._of = kept.copy_(values) if alike else values, self._state(table)
         return self._values
@@ -161,10 +155,9 @@ class HashGrid(nn.Module):
     Args:
         spec: The shape of the grid.
         init_scale: The bound of the table's first values, which are uniform in [-init_scale, init_scale].
-        table_dtype: The dtype of a copy that is read instead of the parameter, torch.float16 or torch.bfloat16; None
-            reads the parameter. The parameter and its gradient stay float32. The copy is renewed when the parameter has
-            changed and is not part of state_dict. Entries beyond the dtype's largest number (float16: 65504) are read
-            as that number.
+        table_dtype: The dtype of a copy that is read instead of the parameter, torch.float16; None reads the parameter.
+            The parameter and its gradient stay float32. The copy is renewed when the parameter has changed and is not
+            part of state_dict. Entries beyond float16's largest number, 65504, are read as that number.
 
     Raises:
         ValueError: table_dtype is another dtype.
@@ -177,17 +170,19 @@ class HashGrid(nn.Module):
 
     def __init__(self, spec: HashGridSpec, init_scale: float = 1e-4, table_dtype: torch.dtype | None = None):
         super().__init__()
+        if table_dtype not in (None, torch.float16):
+            raise ValueError(f"table_dtype must be torch.float16 or None, got {table_dtype}")
         self.spec = spec
-        self.copy = None if table_dtype is None else TableCopy(table_dtype)
+        self.copy = None if table_dtype is None else TableCopy()
         self.n_active = spec.n_levels
         self.table = nn.Parameter((torch.rand(spec.n_entries, spec.n_features) * 2 - 1) * init_scale)
 
     def stored(self) -> Tensor | None:
-        """The table's current 16-bit copy; None without `table_dtype`."""
+        """The table's current float16 copy; None without `table_dtype`."""
         return None if self.copy is None else self.copy.of(self.table)
 
     def extra_repr(self) -> str:
-        stored = "" if self.copy is None else f", table_dtype={self.copy.dtype}"
+        stored = "" if self.copy is None else ", table_dtype=torch.float16"
         return f"{self.spec}, n_active={self.n_active}{stored}"
 
     def forward(self, positions: Tensor) -> Tensor:
@@ -208,11 +203,11 @@ def _keep_encoded(ctx, inputs, output):
 
 
 def refuse_rounded_gradients(ctx, op: str, table: Tensor, stored: list[Tensor], place: int = 7) -> None:
-    """Raises where a 16-bit table, or its copy, argument number `place`, needs a gradient: small ones would round to
+    """Raises where a float16 table, or its copy, argument number `place`, needs a gradient: small ones would round to
     0."""
     if stored:
         refuse_gradients(ctx, op, stored=place)
-    if ctx.needs_input_grad[1] and table.dtype in (torch.float16, torch.bfloat16):
+    if ctx.needs_input_grad[1] and table.dtype == torch.float16:
         raise RuntimeError(
             f"{op}: no gradient to a table of {table.dtype} is defined; give it as stored, beside the float32 table"
         )
@@ -255,8 +250,8 @@ class SdfNetwork(NamedTuple):
     Attributes:
         spec: The shape of the hash grid that computes the features.
         n_active: The number of open levels.
-        table: [spec.n_entries, spec.n_features] entries in the dtype of the other tensors; or in float16 or bfloat16
-            where the others are float32.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of the other tensors; or in float16 where the
+            others are float32.
         hidden, hidden_bias: [width, 3 + spec.n_outputs] weights and [width] biases of the hidden layer.
         out, out_bias: [m, width] weights and [m] biases of the output layer.
         beta: The sharpness of the activation softplus(y) = log(1 + exp(beta y)) / beta, positive.
@@ -316,8 +311,8 @@ def sdf_field(
     Args:
         positions: [n, 3] points, scene units, float32 or float64. Features of a point outside of [-box, box] are those of the
             nearest point of this cube. A NaN coordinate gives NaN.
-        table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16 or
-            bfloat16 with float32 positions.
+        table: [spec.n_entries, spec.n_features] entries in the dtype of positions; or, if it needs no gradient, float16
+            with float32 positions.
         hidden, hidden_length, hidden_bias: [width, 3 + C] directions, [width, 1] lengths and [width] biases of the hidden layer,
             C = spec.n_outputs. A direction of zeros gives NaN.
         out, out_length, out_bias: [m, width] directions, [m, 1] lengths and [m] biases of the output layer, m > 0.
@@ -325,7 +320,7 @@ def sdf_field(
         box: The half size of the cube that the grid covers, scene units, positive.
         spec: The shape of the grid.
         n_active: The number of open levels, coarsest first; features of closed levels are 0. Default: all.
-        stored: A copy of the float32 table in float16 or bfloat16, which is read instead of the table; or None.
+        stored: A copy of the float32 table in float16, which is read instead of the table; or None.
 
     Returns:
         outputs [n, m], features [n, C] and gradient [n, 3] = d outputs[:, 0] / d positions. Differentiable once in table, weights,

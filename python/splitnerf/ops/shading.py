@@ -18,7 +18,7 @@ from torch import Tensor
 from splitnerf import _core
 from splitnerf.ops._library import front, lib, register
 
-FRESNEL_MODES = ("exact", "paper", "code")
+FRESNEL_MODES = ("exact", "paper")
 QUERIES = ("mean", "reflection")
 SHADED = "normals view_dirs albedo roughness metallic specular diffuse occlusion_s occlusion_d".split()
 
@@ -106,8 +106,8 @@ def split_sum_shade(
             the light answers to :func:`light_queries`, g(d, rho) of all points and then g(n, 1) of all.
         diffuse: [n, 3] radiance g(n, 1), or None.
         occlusion_s, occlusion_d: [n, 1] or [n, 3] occlusion factors in [0, 1], 1 = open; None: open everywhere.
-        fresnel_mode: The form of the Fresnel term: ``exact`` (above), ``paper`` or ``code``. The last two mix the
-            materials' reflectances, ``F0 = 0.04 (1 - m) + m albedo``, and apply the term twice, as published.
+        fresnel_mode: The form of the Fresnel term: ``exact`` (above) or ``paper``, which mixes the materials' reflectances,
+            ``F0 = 0.04 (1 - m) + m albedo``, and applies the term twice, as published.
         compensate: Whether to compensate for multiple scattering: each lobe's ``E [1 + F0 (1/(F1 + F2) - 1)]`` with F0
             the albedo of the metal and 0.04 of the dielectric (Turquin 2019), as in Blender's Principled BSDF.
         indirect_s, indirect_d: [n, 3] light i_s and i_d >= 0 that the object itself sends to the points, in the

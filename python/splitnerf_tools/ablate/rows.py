@@ -36,7 +36,6 @@ SWITCHES: dict[str, dict[str, object]] = {
     "split sum, occlusion averaged over channels": SPLIT | {"occlusion.channels": 1},
     "split sum, no occlusion": SPLIT | {"occlusion.kind": "off"},
     "split sum, Fresnel as in the paper": SPLIT | {"shading.fresnel": "paper"},
-    "split sum, Fresnel as in the released code": SPLIT | {"shading.fresnel": "code"},
     "split sum, light queried at the reflection": SPLIT | {"shading.query": "reflection"},
     "split sum, composited in sRGB": SPLIT | {"shading.compositing": "srgb"},
     "no indirect light": {"occlusion.indirect": False},

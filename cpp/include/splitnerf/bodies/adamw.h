@@ -23,7 +23,7 @@ template <class T> struct AdamwRule {
         eps(T(eps)) {}
 };
 
-// Numbers in rows of `columns`; half and bfloat16, where not null, take a copy of param as it is after the step.
+// Numbers in rows of `columns`; half, where not null, takes a copy of param as it is after the step.
 template <class T> struct AdamwArrays {
   int64_t n, columns;
   bool sparse;  // leaves a row alone whose gradients are all 0
@@ -31,7 +31,6 @@ template <class T> struct AdamwArrays {
   const T* grad;
   T *exp_avg, *exp_avg_sq;
   Half* half;
-  Bfloat16* bfloat16;
 };
 
 template <class T>
@@ -49,8 +48,7 @@ template <class T> struct AdamwBody {
   SPLITNERF_HD void operator()(int64_t i) const {
     if (x.sparse && !row_moves(i / x.columns)) return;
     adamw_number(rule, x.grad[i], x.param[i], x.exp_avg[i], x.exp_avg_sq[i]);
-    if (x.half) x.half[i] = narrow<Half>(float(x.param[i]));
-    if (x.bfloat16) x.bfloat16[i] = narrow<Bfloat16>(float(x.param[i]));
+    if (x.half) x.half[i] = narrow(float(x.param[i]));
   }
 
  private:
