@@ -8,15 +8,20 @@ from splitnerf_tools.bench.charts import table as table_lines
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
 
-from stability import fields, light, losses, properties, rays, shading
+from stability import fields, light, losses, properties, rays, shading, steps
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify
 from stability.search import Result, run
 
-ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES
-PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
+ENTRIES: tuple[Entry, ...] = sum((part.ENTRIES for part in (shading, light, rays, fields, losses, steps)), ())
+PROPERTIES: tuple[Property, ...] = properties.PROPERTIES + steps.PROPERTIES
 NAME = "stability"
-SOURCES = ("cpp", "python/splitnerf/ops")
+SOURCES = (
+    "cpp",
+    "python/splitnerf/ops",
+    "python/splitnerf/refinement/*equations.py",
+    "python/splitnerf/training/exposure.py",
+)
 COLUMNS = (
     "operator, inputs, worst forward, promised, worst gradient, promised gradient, without condition, "
     "gradient without condition, gradient to shared, float64 against exact, float32 against exact, not finite, holds, reason"
@@ -126,7 +131,9 @@ INTRODUCTION = """Each operator in float32 against itself in float64 on the same
 crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
 of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
 change of the inputs; the columns "without condition" leave the latter out. The condition is only computed above the
-promised error: an error just below that is an upper bound. The outputs of the worst thousand inputs were computed again in
-50 digits where the operator has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts
-rows with NaN or infinity where the truth has a float32, or whose truth is NaN. Tables of the hash
-grid may be float16 or bfloat16: compared with float64 on the same numbers. No other input may be: they raise."""
+promised error: an error just below that is an upper bound. "Gradient to shared" is the error of a sum over many rows, of
+the rows within their promise. The outputs of the worst thousand inputs were computed again in 50 digits where the operator
+has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts rows with NaN or
+infinity where the truth has a float32, or whose truth is NaN. Tables of the hash grid may be float16 or bfloat16: compared
+with float64 on the same numbers. No other input may be: they raise. The last table holds what draws, traces or counts, and
+what iterates: there a statement is checked."""
