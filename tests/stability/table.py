@@ -1,6 +1,10 @@
 """The table of worst errors, as Markdown and CSV, and the run of all operators."""
 
+import multiprocessing
+import pickle
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from splitnerf.errors import InputError
@@ -43,18 +47,30 @@ def chosen(names: list[str]) -> list[Entry | Property]:
 
 
 def run_all(
-    items: list[Entry | Property], cases: int, seed: int, show: Callable[[str], None]
+    items: list[Entry | Property], cases: int, seed: int, show: Callable[[str], None], jobs: int = 1
 ) -> tuple[list[Result], list[Verdict]]:
-    """Runs entries and properties one after the other; ``show`` is called with a line for each."""
+    """Runs entries and properties, as many at a time as there are jobs; ``show`` is called with a line for each."""
     results, verdicts = [], []
-    for item in items:
-        if isinstance(item, Entry):
-            results.append(run(item, cases, seed))
-            show(result_line(results[-1]))
-        else:
-            verdicts.append(verify(item, cases, seed))
-            show(verdict_line(verdicts[-1]))
+    work = [(item.name, cases, seed) for item in items]
+    with multiprocessing.get_context("fork").Pool(jobs, maxtasksperchild=1) if jobs > 1 else nullcontext() as pool:
+        for item, written in zip(items, pool.imap(run_one, work, chunksize=1) if pool else map(run_one, work)):
+            found = pickle.loads(written)
+            if isinstance(item, Entry):
+                results.append(replace(found, entry=item))
+                show(result_line(results[-1]))
+            else:
+                verdicts.append(replace(found, claim=item))
+                show(verdict_line(verdicts[-1]))
     return results, verdicts
+
+
+def run_one(work: tuple[str, int, int]) -> bytes:
+    """The pickled result of the item of a name, without the item: its functions cannot be sent to another process."""
+    name, cases, seed = work
+    item = next(item for item in (*ENTRIES, *PROPERTIES) if item.name == name)
+    if isinstance(item, Entry):
+        return pickle.dumps(replace(run(item, cases, seed), entry=None))
+    return pickle.dumps(replace(verify(item, cases, seed), claim=None))
 
 
 def number(x: float | None) -> str:
