@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import pytest
 import torch
@@ -12,6 +13,7 @@ from stability.entry import Entry
 from stability.measure import cast, evaluate
 from torch.utils._python_dispatch import TorchDispatchMode
 
+PAGE = Path(__file__).parents[2] / "docs/benchmarks/stability.md"
 CASES, EXACT = 100_000, 50
 FEWER = {
     "sparse_product": 50_000,
@@ -56,7 +58,7 @@ class Called(TorchDispatchMode):
 
 
 def test_every_registered_operator_has_a_row():
-    """All that the library registers, by the names of entries and properties; and what these call, forward and backward."""
+    """By the names of entries and properties, all of which the page has; and by what these call, forward and backward."""
     for module in (fields, light, losses, properties, rays, shading, steps):
         for made in vars(module).values():  # what another test has made would not be made here
             if hasattr(made, "cache_clear"):
@@ -73,6 +75,7 @@ def test_every_registered_operator_has_a_row():
     rows = {item.name for item in (*table.ENTRIES, *table.PROPERTIES)}
     named = {re.sub("_backward(_positions)?$", "", name) for name in registered}
     assert named - {name.partition(",")[0] for name in rows} == set()
+    assert rows == set(re.findall(r"(?m)^\| (.+?) \| \d+ \|", PAGE.read_text()))
 
 
 # ---- the harness -------------------------------------------------------------------------------
