@@ -76,7 +76,7 @@ fuzz: install
 	  $(BIN)/python tests/fuzz/fuzz_readers.py $$reader -max_total_time=$$(($(FUZZ_SECONDS) / 4)); done; done
 
 stability: install
-	PYTHONPATH=tests $(BIN)/python -m stability --cases $(STABILITY_CASES) $(STABILITY_OPTIONS)
+	PYTHONPATH=tests $(BIN)/python -m stability --jobs $(JOBS) --cases $(STABILITY_CASES) $(STABILITY_OPTIONS)
 
 tables: install
 	@$(BIN)/python tests/bench/tables.py

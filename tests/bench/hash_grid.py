@@ -8,7 +8,7 @@ import torch
 from splitnerf.ops import HashGridSpec, hash_encode
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
-from splitnerf_tools.bench.subjects import drjit_ready
+from splitnerf_tools.bench.subjects import drjit_ready, leave_out
 from torch import Tensor
 
 SPEC = HashGridSpec(n_levels=16, n_features=2, base_resolution=32, growth=1.3195079, log2_table_size=19)
@@ -51,8 +51,13 @@ def run(quick: bool, rounds: int) -> Result:
     errors = {key: max(relative(a, b) for a, b in zip(call(), true)) for key, call in calls.items()}
     check("hash grid", errors, TOLERANCE)
     if not quick and drjit_ready():
-        peers = {storage: DrJitHashGrid(SPEC, storage, x, cotangent) for storage in ("Float32", "Float16")}
-        calls |= {("Dr.Jit", storage.lower()): peer.forward_backward for storage, peer in peers.items()}
+        for storage in ("Float32", "Float16"):
+            peer = DrJitHashGrid(SPEC, storage, x, cotangent)
+            try:
+                peer.forward_backward()
+                calls["Dr.Jit", storage.lower()] = peer.forward_backward
+            except RuntimeError as error:
+                leave_out(f"Dr.Jit with {storage.lower()} is left out: {str(error).splitlines()[0]}")
     times = interleaved(calls, rounds)
 
     first, peer = ("splitnerf", "float32"), ("torch eager", "float32")

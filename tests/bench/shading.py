@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 import reference
 import torch
-from splitnerf.errors import note
 from splitnerf.ops import fibonacci_directions, prefilter_light, split_sum_shade
 from splitnerf.ops.shading import SHADED, brdf_lut
 from splitnerf_tools.bench.charts import Result
 from splitnerf_tools.bench.harness import chart_of, check, interleaved, with_gradients
+from splitnerf_tools.bench.subjects import leave_out
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -76,7 +76,7 @@ def shading_calls(n: int, compiled: bool) -> tuple[dict[str, Callable[[], object
             with_gradients(fast, inputs, torch.ones(n, 3))()
             ways["torch.compile"] = fast
         except Exception as error:  # its compiler raises many types
-            note(f"torch.compile does not work here ({str(error).splitlines()[0]}): it is left out")
+            leave_out(f"torch.compile does not work here ({str(error).splitlines()[0]}): it is left out")
     return checked(ways, plain, inputs)
 
 

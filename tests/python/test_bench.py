@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
 from splitnerf_tools.bench.harness import interleaved
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
-from splitnerf_tools.bench.subjects import MapLight, pyramid_of
+from splitnerf_tools.bench.subjects import LEFT_OUT, MapLight, leave_out, pyramid_of
 from torch.nn import functional as F
 
 
@@ -99,7 +100,18 @@ def test_commands_hold_no_path_of_the_machine(monkeypatch):
     monkeypatch.setattr("sys.argv", [".venv/bin/splitnerf", "bench"])
     assert provenance.command_line() == "splitnerf bench"
     monkeypatch.setattr("sys.argv", ["tests/bench/limits.py", "--out"])
-    assert provenance.command_line() == "tests/bench/limits.py --out"
+    assert provenance.command_line() == "python tests/bench/limits.py --out"
+
+
+def test_a_page_says_which_library_was_missing(tmp_path, monkeypatch):
+    result = Result("work", "Work", ("cpp",), ["b is twice as fast"])
+    monkeypatch.setattr(
+        harness.importlib,
+        "import_module",
+        lambda _: SimpleNamespace(run=lambda *_: (leave_out("c is left out"), result)[1]),
+    )
+    harness.run_benchmarks(["work"], True, tmp_path, print)
+    assert "- b is twice as fast\n- c is left out\n" in (tmp_path / "work.md").read_text() and not LEFT_OUT
 
 
 def test_errors_are_refused_before_they_are_timed():

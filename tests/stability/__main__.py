@@ -8,6 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
+import torch
 from splitnerf.errors import InputError
 
 DONE, BROKEN, BAD_INPUT = 0, 1, 2
@@ -18,6 +19,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--cases", type=int, default=10**7, metavar="N", help="inputs of an operator (default: 10^7)")
     parser.add_argument("--op", action="append", default=[], metavar="NAME", help="only this operator; may be repeated")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the inputs (default: 0)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="operators at a time (default: 1)")
     parser.add_argument(
         "--out", type=Path, default=Path("docs/benchmarks"), metavar="DIR", help="default: docs/benchmarks"
     )
@@ -35,10 +37,11 @@ def main(argv: list[str] | None = None) -> int:
     try:
         if args.cases < 1:
             raise InputError(f"--cases must be positive, got {args.cases}")
+        torch.set_num_threads(1)  # before the processes part
         from stability import table
 
-        items = table.chosen(args.op)
-        results, verdicts = table.run_all(items, args.cases, args.seed, lambda line: print(line, flush=True))
+        items, show = table.chosen(args.op), lambda line: print(line, flush=True)
+        results, verdicts = table.run_all(items, args.cases, args.seed, show, args.jobs)
     except InputError as error:
         print(f"stability: {error}", file=sys.stderr)
         return BAD_INPUT

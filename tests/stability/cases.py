@@ -98,6 +98,12 @@ def unit(x: Tensor) -> Tensor:
     return x / x.norm(dim=-1, keepdim=True).clamp(min=1e-300)
 
 
+def directions_of(x: Tensor) -> Tensor:
+    """[n, 3] the unit directions of float32 vectors; that of 0 is z."""
+    found = unit(x.double())
+    return torch.where((found == 0).all(1, keepdim=True), torch.tensor([0.0, 0.0, 1.0], dtype=found.dtype), found)
+
+
 def drawn_directions(
     normals: Tensor, view_dirs: Tensor, roughness: Tensor, share: float, n_samples: int, seed: int = 0
 ) -> tuple[Tensor, Tensor]:

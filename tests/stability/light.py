@@ -7,7 +7,7 @@ from splitnerf import ops
 from torch import Tensor
 
 from stability import exact_light
-from stability.cases import Draw, unit
+from stability.cases import Draw, directions_of, unit
 from stability.entry import Entry, Rows
 
 LIGHTS = 96
@@ -15,7 +15,7 @@ RESOLUTIONS, NODES, ZONAL_ROWS = (16, 8, 4), (0.1, 0.2, 0.35, 0.5), 33
 
 
 def repaired(rows: Rows) -> Rows:
-    return {"query_dirs": unit(rows["query_dirs"].double()), "roughness": rows["roughness"].clamp(0, 1)}
+    return {"query_dirs": directions_of(rows["query_dirs"]), "roughness": rows["roughness"].clamp(0, 1)}
 
 
 def draw_queries(draw: Draw, n: int) -> Rows:
@@ -57,7 +57,7 @@ def draw_lookup(draw: Draw, n: int) -> Rows:
 
 
 def repaired_lookup(rows: Rows) -> Rows:
-    return {"directions": unit(rows["directions"].double()), "roughness": rows["roughness"].clamp(0, 1)}
+    return {"directions": directions_of(rows["directions"]), "roughness": rows["roughness"].clamp(0, 1)}
 
 
 @lru_cache(maxsize=1)

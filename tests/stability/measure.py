@@ -77,7 +77,8 @@ def measure(entry: Entry, rows: Rows) -> Errors:
             error, bad = row_error(ours[name], truth[name], floor)
             plain, broken = torch.maximum(plain, error), broken | bad
         parts.append(plain)
-    forward, gradient, spoilt = parts[0].clone(), parts[1].clone(), False
+    forward, gradient = parts[0].clone(), parts[1].clone()
+    spoilt = any(bool(row_error(got_shared[k][None], x[None], 0.0)[1]) for k, x in true_shared.items())
     if entry.conditioned:
         for probes, share in ROUNDS:
             high = torch.maximum(forward / entry.bound, gradient / (entry.gradient_bound or torch.inf))
@@ -88,15 +89,26 @@ def measure(entry: Entry, rows: Rows) -> Errors:
                 ours = ({k: x[which] for k, x in got.items()}, {k: x[which] for k, x in got_gradients.items()})
                 forward[which], gradient[which] = conditioned_errors(entry, few, ours, probes)
         calm = (parts[0] <= entry.bound) & (parts[1] <= entry.gradient_bound) & ~broken
-        spoilt = any(bool(row_error(got_shared[k][None], x[None], 0.0)[1]) for k, x in true_shared.items())
         if true_shared and not bool(calm.all()):
             few = {name: x[calm] for name, x in rows.items()}
             got_shared, true_shared = (evaluate(entry, few, dtype)[2] for dtype in (torch.float32, torch.float64))
-    worst_shared = math.inf if spoilt else 0.0
-    for name, truth in true_shared.items():
-        error, bad = row_error(got_shared[name][None], truth[None], entry.gradient_floor)
-        worst_shared = max(worst_shared, float("inf") if bool(bad) else float(error))
+            rows = few
+    worst_shared = math.inf if spoilt else shared_error(entry, rows, got_shared, true_shared)
     return Errors(forward, gradient, *parts, broken, worst_shared)
+
+
+def shared_error(entry: Entry, rows: Rows, got: Rows, true: Rows) -> float:
+    """Largest error of the gradients to what the rows share, over their size and, above the bound, their condition."""
+    errors = [row_error(got[name][None], x[None], entry.gradient_floor)[0].item() for name, x in true.items()]
+    if entry.conditioned and errors and max(errors) > entry.shared_bound:
+        generator, wide = torch.Generator().manual_seed(0), dict.fromkeys(true, 0.0)
+        for _ in range(ROUNDS[0][0]):
+            near = {name: changed(x, generator, name in entry.vectors) for name, x in rows.items()}
+            shared = {name: changed(x, generator) for name, x in entry.shared.items()}
+            for name, x in evaluate(entry, near, torch.float64, shared, generator)[2].items():
+                wide[name] = max(wide[name], (x - true[name]).abs().max().item() / CHANGE)
+        errors = [row_error(got[k][None], x[None], entry.gradient_floor, wide[k])[0].item() for k, x in true.items()]
+    return max(errors, default=0.0)
 
 
 def row_error(got: Tensor, true: Tensor, floor: float, scale: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 import trimesh
 from splitnerf import ops
+from splitnerf.ops._library import lib
 from torch import Tensor
 
 from stability.cases import Draw, unit
@@ -31,6 +32,8 @@ class Property:
         check: See above.
         statement: In words.
         size: Inputs that one case holds.
+        chunk: Cases at a time.
+        most: Inputs that are enough, as one takes long.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Property:
     statement: str
     size: int = 1
     chunk: int = 1 << 13
+    most: int = 10**7
 
 
 @lru_cache(maxsize=1)
@@ -166,6 +170,75 @@ def all_blocked(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return factors(rows, sky, 0.0, 0.0), rows
 
 
+def pixels_read(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Codes of 8, 16 and 32 bits stand for their values, at edges with the colour behind."""
+    codes = torch.randint(0, 65536, (120, 4), generator=draw.generator)
+    codes[::7] = torch.tensor([0, 1, 32768, 65535])
+    index = torch.randint(120, (n,), generator=draw.generator)
+    view, exposures = index // 40, draw.radiance(3, 3).float()
+    edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54])
+    behind = torch.randint(256, (46, 3), generator=draw.generator).to(torch.uint8)
+    random = draw.shares(n, 3).float()
+    at_edge = ((index >= 3) & (index < 9)) | ((index >= 60) & (index < 100))
+    row = torch.where(at_edge, index + torch.where(index < 9, -3, -54), 0)
+    background = torch.where(at_edge[:, None], behind[row].double() / 255, random)
+    apart = torch.zeros(n, dtype=torch.float64)
+    stored = (codes.to(torch.uint8), 255), (codes.short(), 65535), (draw.radiance(120, 4).float(), 1)
+    for bits, most in stored:
+        values = {255: codes % 256, 65535: codes, 1: bits}[most].double()[index] / most
+        pixels, exposure, beside, whole = ops.rays.read_pixels(
+            bits, index, view, exposures, random, ops.rays.EdgeRuns(*edges, behind)
+        )
+        wrong = (exposure != exposures[view]).any(1) | (whole != at_edge)
+        off = torch.cat([pixels - values, beside - background], 1).abs() / torch.cat([values, background], 1).clamp(
+            min=1e-30
+        )
+        apart = torch.maximum(apart, torch.where(wrong, 1.0, off.amax(1)))
+    return apart - 2e-7, {"index": index, "background": random}
+
+
+@lru_cache(maxsize=3)
+def sheet(thickness: float) -> ops.sdf.SdfNetwork:
+    """|z| - thickness / 2 as two softplus units: a sheet with a surface on either side."""
+    spec = ops.HashGridSpec(n_levels=1, n_features=2, base_resolution=4, growth=2.0, log2_table_size=9)
+    hidden = torch.zeros(2, 3 + spec.n_outputs)
+    hidden[0, 2], hidden[1, 2] = 1.0, -1.0
+    zeros, bias = torch.zeros(spec.n_entries, spec.n_features), torch.tensor([-thickness / 2])
+    return ops.sdf.SdfNetwork(spec, 1, zeros, hidden, torch.zeros(2), torch.ones(1, 2), bias, 1e5, 1.0)
+
+
+def sampled(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """No ray jumps over a thin sheet, grazing ones either; samples ascend and lie in the box."""
+    step, s, thickness = 1 / 128, draw.pick((200.0, 2000.0, 8000.0), 1).item(), draw.pick((5e-4, 2e-3, 2e-2), 1).item()
+    targets = torch.cat([draw.mixed((0.0, 1e-7), draw.uniform(n, 2, low=-0.9, high=0.9)), torch.zeros(n, 1)], 1)
+    slope = draw.mixed((0.1, 1.0), draw.logarithmic(0.1, 10, n, 1)) * draw.signs(n, 1)
+    side = unit(torch.cat([draw.normal(n, 2), torch.zeros(n, 1)], 1))
+    directions = unit(side + slope * torch.tensor([0.0, 0.0, 1.0]))
+    origins = targets - directions * draw.mixed((0.1, 1.0, 3.0), draw.uniform(n, 1, low=0.1, high=4))
+    jitter = draw.shares(n).clamp(max=1 - 6e-8)
+    rows = {"rays_o": origins.float(), "rays_d": directions.float(), "jitter": jitter.float()}
+    cells = torch.full((16, 16, 16), ops.rays.CELL_OCCUPIED, dtype=torch.uint8)
+    found, _, _ = ops.sdf.sample_rays(
+        **rows,
+        cells=cells,
+        network=sheet(thickness),
+        step=step,
+        s=s,
+        min_weight=1e-3,
+        min_transmittance=1e-4,
+        reach=7 / s,
+        lipschitz=1.25,
+    )
+    ray, middle = found.ray_indices, found.middles.double()
+    point = rows["rays_o"].double()[ray] + rows["rays_d"].double()[ray] * middle[:, None]
+    nearest = torch.full((n,), torch.inf, dtype=torch.float64).scatter_reduce(0, ray, point[:, 2].abs(), "amin")
+    wrong = torch.zeros(n, dtype=torch.float64)
+    backwards = (ray[1:] == ray[:-1]) & (found.t_starts.diff() < 0.99 * step)
+    bad = (point.abs().amax(1) > 1 + step) | torch.nn.functional.pad(backwards, (1, 0))
+    wrong = wrong.scatter_reduce(0, ray, bad.double(), "amax")
+    return torch.maximum(wrong, nearest - step - thickness), rows
+
+
 @lru_cache(maxsize=1)
 def cache() -> ops.visibility.VisibilityCache:
     vertices = HALF * CORNERS
@@ -193,9 +266,59 @@ def cached(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     light = torch.full((64, 3), draw.pick((0.0, 1e-38, 1.0, 1e30), 1).item())
     light[3] = max(1e6, light[0, 0].item()) if draw.chance(0.5, 1).item() else light[3]
     o_d, o_s, i_d, i_s = ops.visibility.cached_occlusion(cache(), **rows, light=light, radiance=torch.ones(8, 3))
-    visible, arriving = ops.visibility.cached_visibility(cache(), rows["positions"], rows["normals"], torch.ones(8, 3))
-    found = (o_d, o_s, i_d, i_s, visible, arriving)
-    return torch.stack([finite_in(x, 0.0, 1.0) for x in found]).amax(0) - 1e-5, rows
+    return torch.stack([finite_in(x, 0.0, 1.0) for x in (o_d, o_s, i_d, i_s)]).amax(0) - 1e-5, rows
+
+
+def seen(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Shares of the sky; what the mesh sends fills up the rest at most."""
+    positions, normals = (x.float() for x in on_cube(draw, n))
+    visible, arriving = ops.visibility.cached_visibility(cache(), positions, normals, torch.ones(8, 3))
+    apart = finite_in(visible + arriving.mean(-1), 0.0, 1.0)
+    return torch.maximum(apart, finite_in(torch.stack([visible, arriving.mean(-1)], 1), 0.0, 1.0)) - 1e-5, {
+        "positions": positions,
+        "normals": normals,
+    }
+
+
+def vertices_in_grids(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Each level lists every vertex once, and those of one cell in one bucket."""
+    radius, n_levels = draw.pick((1e-6, 0.1, 1e3), 1).item(), 3
+    corner = torch.round(draw.uniform(n, 3, low=-4, high=4)) * 2 * radius
+    x = draw.mixed((0.0, 1e-38, -1e-7, 1e6, 1e30, -1e30), draw.normal(n, 3), 0.2)
+    x = torch.where(draw.chance(0.3, n, 1), corner, x).float()
+    starts, order = lib.vertex_grids(x, radius, n_levels)
+    inverse, wrong = torch.tensor(0.5) / torch.tensor(radius).float(), torch.zeros(n, dtype=torch.bool)
+    for first, listed, size in zip(starts.view(n_levels, -1), order.view(n_levels, -1).long(), (1, 2, 4)):
+        bucket = torch.empty(n, dtype=torch.int64)
+        bucket[listed] = torch.searchsorted(first.contiguous(), torch.arange(n, dtype=first.dtype), right=True) - 1
+        _, cell = torch.unique((x * (inverse / size)).clamp(-1e9, 1e9).floor(), dim=0, return_inverse=True)
+        of_cell = torch.zeros(n, dtype=torch.int64).scatter_(0, cell, bucket)[cell]
+        wrong |= (bucket != of_cell) | (listed.bincount(minlength=n) != 1) | bool((first.diff() < 0).any())
+    return wrong.double(), {"vertices": x}
+
+
+def rays_drawn(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Each ray goes through a pixel of its part of its list, from its view's centre, with length 1."""
+    height, width, n_near = 8, 11, int(n * draw.uniform(1).item())
+    random = draw.shares(n).clamp(max=1 - 6e-8).float()
+    matrices = (draw.pick((1e-4, 1.0, 1e4), 3, 1, 1) * (torch.eye(3) + 0.3 * draw.normal(3, 3, 3))).float()
+    origins = draw.pick((0.0, 1e-38, 1.0, 1e6), 3, 3).float()
+    near = ops.rays.PixelList(torch.tensor([4, 5, 40]), torch.tensor([10, 30, 200]), 40)
+    known = ops.rays.PixelList.all(3 * height * width, torch.device("cpu"))
+    rays_o, rays_d, view, index = ops.rays.draw_rays(random, n_near, near, known, matrices, origins, height, width)
+    i, beside = torch.arange(n), torch.arange(n) < n_near
+    listed = torch.cat([torch.arange(10, 14), torch.tensor([34]), torch.arange(205, 240)])
+    rank = torch.where(beside, torch.searchsorted(listed, index), index)
+    part = torch.where(beside, 40 / max(n_near, 1), 3 * height * width / max(n - n_near, 1))
+    place = (torch.where(beside, i, i - n_near) + random.double()) * part
+    border = (place - place.round()).abs() < 1e-4
+    off = (rank - place.floor()).abs() > border.long()
+    point = torch.stack([index % width + 0.5, index // width % height + 0.5, torch.ones(n)], 1).double()
+    products = matrices.double()[view] * point[:, None]
+    along, size = products.sum(2), products.abs().sum(2).norm(dim=1)
+    apart = (rays_d.double() - unit(along)).norm(dim=1) - 1e-6 * size / along.norm(dim=1)
+    wrong = (view != index // (height * width)) | (rays_o != origins[view]).any(1) | (index >= 3 * height * width)
+    return torch.where(wrong | off, 1.0, apart), {"random": random, "matrices": matrices[view]}
 
 
 def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
@@ -284,7 +407,14 @@ PROPERTIES = (
         chunk=1024,
     ),
     Property("cached_occlusion", cached, "in [0, 1], the mesh's own light too, under black and single lights"),
+    Property("cached_visibility", seen, "open and blocked shares of each direction sum up to at most 1"),
+    Property("vertex_grids", vertices_in_grids, "every level lists each vertex once, those of one cell together"),
+    Property(
+        "draw_rays", rays_drawn, "unit, through a pixel of the ray's own part of its list, from its view's centre"
+    ),
+    Property("read_pixels", pixels_read, "codes of 8, 16 and 32 bits are the values they stand for"),
     Property("march_rays", marched, "in the box, ascending by the step, at most as many as asked for"),
+    Property("sample_rays", sampled, "no ray jumps over a sheet 1/15 of a step thick; in the box, ascending"),
     Property("spread_samples", spread, "shares in [0, 1]; every ray has a sample; constants stay themselves", size=8),
     Property("sample_ggx_lobe", lobe_samples, "unit, above the horizon, evenly spaced in the CDF of D cos", size=8),
 )
@@ -305,7 +435,7 @@ class Verdict:
 
 
 def verify(claim: Property, cases: int, seed: int = 0) -> Verdict:
-    draw, total, done, broken, worst = Draw(seed), max(1, cases // claim.size), 0, 0, {}
+    draw, total, done, broken, worst = Draw(seed), max(1, min(cases, claim.most) // claim.size), 0, 0, {}
     while done < total:
         n = min(claim.chunk, total - done)
         violation, rows = claim.check(draw, n)

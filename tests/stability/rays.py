@@ -11,6 +11,7 @@ from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
 
 SAMPLES = 8  # of a ray
+SHADED = 5  # of these
 LONG = 10_000  # samples of a long ray
 STEP = 1 / 128
 WIDEST = 4e6  # length of a sample over which the distance may fall by half as much
@@ -130,6 +131,21 @@ def means(rows: Rows, shared: Rows) -> Rows:
     return {"means": found}
 
 
+def draw_interpolation(draw: Draw, n: int) -> Rows:
+    """Values at shaded samples, and of each sample the two beside it, now and then the same one."""
+    first = torch.randint(SHADED, (n, SAMPLES), generator=draw.generator)
+    beside = (first + draw.chance(0.7, n, SAMPLES)).clamp(max=SHADED - 1)
+    values = draw.radiance(n, SHADED, 3) * draw.signs(n, 1, 1)
+    return {"values": values, "share": draw.shares(n, SAMPLES), "first": first, "second": beside}
+
+
+def interpolated(rows: Rows, shared: Rows) -> Rows:
+    n, none = len(rows["first"]), torch.empty(0, dtype=torch.int64)
+    first, second = ((rows[name] + SHADED * torch.arange(n)[:, None]).flatten() for name in ("first", "second"))
+    subset = ops.rays.ShadingSubset(none, first, second, rows["share"].flatten(), *[none] * 4)
+    return {"values": subset.interpolate(rows["values"].reshape(n * SHADED, 3)).reshape(n, SAMPLES, 3)}
+
+
 def ends_entry(name: str, s: float, draw, step: float, **changes) -> Entry:
     options = {
         "bound": 4e-6,
@@ -206,5 +222,16 @@ ENTRIES = (
         size=LONG,
         chunk=8,
         reason="sums in float64, rounded once; gradients are sums over the channels",
+    ),
+    Entry(
+        "interpolate",
+        draw=draw_interpolation,
+        call=interpolated,
+        smooth=("values",),
+        bound=1e-6,
+        gradient_bound=1e-6,
+        size=SAMPLES,
+        repair=lambda rows: rows | {"share": rows["share"].clamp(0, 1)},
+        reason="a weighted mean of two; gradients are sums of eight weights",
     ),
 )

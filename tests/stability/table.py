@@ -1,6 +1,10 @@
 """The table of worst errors, as Markdown and CSV, and the run of all operators."""
 
+import multiprocessing
+import pickle
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from splitnerf.errors import InputError
@@ -8,15 +12,20 @@ from splitnerf_tools.bench.charts import table as table_lines
 from splitnerf_tools.bench.charts import write_csv
 from splitnerf_tools.bench.provenance import header, provenance
 
-from stability import fields, light, losses, properties, rays, shading
+from stability import fields, light, losses, properties, rays, shading, steps
 from stability.entry import Entry, Rows
 from stability.properties import Property, Verdict, verify
 from stability.search import Result, run
 
-ENTRIES: tuple[Entry, ...] = shading.ENTRIES + light.ENTRIES + rays.ENTRIES + fields.ENTRIES + losses.ENTRIES
-PROPERTIES: tuple[Property, ...] = properties.PROPERTIES
+ENTRIES: tuple[Entry, ...] = sum((part.ENTRIES for part in (shading, light, rays, fields, losses, steps)), ())
+PROPERTIES: tuple[Property, ...] = properties.PROPERTIES + steps.PROPERTIES
 NAME = "stability"
-SOURCES = ("cpp", "python/splitnerf/ops")
+SOURCES = (
+    "cpp",
+    "python/splitnerf/ops",
+    "python/splitnerf/refinement/*equations.py",
+    "python/splitnerf/training/exposure.py",
+)
 COLUMNS = (
     "operator, inputs, worst forward, promised, worst gradient, promised gradient, without condition, "
     "gradient without condition, gradient to shared, float64 against exact, float32 against exact, not finite, holds, reason"
@@ -38,18 +47,30 @@ def chosen(names: list[str]) -> list[Entry | Property]:
 
 
 def run_all(
-    items: list[Entry | Property], cases: int, seed: int, show: Callable[[str], None]
+    items: list[Entry | Property], cases: int, seed: int, show: Callable[[str], None], jobs: int = 1
 ) -> tuple[list[Result], list[Verdict]]:
-    """Runs entries and properties one after the other; ``show`` is called with a line for each."""
+    """Runs entries and properties, as many at a time as there are jobs; ``show`` is called with a line for each."""
     results, verdicts = [], []
-    for item in items:
-        if isinstance(item, Entry):
-            results.append(run(item, cases, seed))
-            show(result_line(results[-1]))
-        else:
-            verdicts.append(verify(item, cases, seed))
-            show(verdict_line(verdicts[-1]))
+    work = [(item.name, cases, seed) for item in items]
+    with multiprocessing.get_context("fork").Pool(jobs, maxtasksperchild=1) if jobs > 1 else nullcontext() as pool:
+        for item, written in zip(items, pool.imap(run_one, work, chunksize=1) if pool else map(run_one, work)):
+            found = pickle.loads(written)
+            if isinstance(item, Entry):
+                results.append(replace(found, entry=item))
+                show(result_line(results[-1]))
+            else:
+                verdicts.append(replace(found, claim=item))
+                show(verdict_line(verdicts[-1]))
     return results, verdicts
+
+
+def run_one(work: tuple[str, int, int]) -> bytes:
+    """The pickled result of the item of a name, without the item: its functions cannot be sent to another process."""
+    name, cases, seed = work
+    item = next(item for item in (*ENTRIES, *PROPERTIES) if item.name == name)
+    if isinstance(item, Entry):
+        return pickle.dumps(replace(run(item, cases, seed), entry=None))
+    return pickle.dumps(replace(verify(item, cases, seed), claim=None))
 
 
 def number(x: float | None) -> str:
@@ -126,7 +147,9 @@ INTRODUCTION = """Each operator in float32 against itself in float64 on the same
 crossed with ordinary ones, and a search around the worst. An error is the largest difference in one output or gradient
 of a row over the largest number there plus, where the condition counts, how much the true value changes by a relative
 change of the inputs; the columns "without condition" leave the latter out. The condition is only computed above the
-promised error: an error just below that is an upper bound. The outputs of the worst thousand inputs were computed again in
-50 digits where the operator has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts
-rows with NaN or infinity where the truth has a float32, or whose truth is NaN. Tables of the hash
-grid may be float16: compared with float64 on the same numbers. No other input may be: they raise."""
+promised error: an error just below that is an upper bound. "Gradient to shared" is the error of a sum over many rows, of
+the rows within their promise. The outputs of the worst thousand inputs were computed again in 50 digits where the operator
+has such a formula: "against exact". Gradients are compared with float64 alone. "Not finite" counts rows with NaN or
+infinity where the truth has a float32, or whose truth is NaN. Tables of the hash grid may be float16: compared
+with float64 on the same numbers. No other input may be: they raise. The last table holds what draws, traces or counts, and
+what iterates: there a statement is checked."""

@@ -15,6 +15,7 @@ from splitnerf.errors import CheckFailed
 from torch import Tensor
 
 from splitnerf_tools.bench.charts import Chart, Point, write_result
+from splitnerf_tools.bench.subjects import LEFT_OUT
 
 ROUNDS, QUICK_ROUNDS = 15, 7
 SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
@@ -71,8 +72,7 @@ def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> 
 
 
 def _median_and_quartiles(values: list[float]) -> Quartiles:
-    low, median, high = np.quantile(values, (0.25, 0.5, 0.75))
-    return Quartiles(float(median), float(low), float(high))
+    return Quartiles(*map(float, np.quantile(values, (0.5, 0.25, 0.75))))
 
 
 def rms(values: ArrayLike) -> float:
@@ -144,6 +144,8 @@ def run_benchmarks(modules: Sequence[str], quick: bool, out: Path, show: Callabl
     files = []
     for module in modules:
         result = importlib.import_module(module).run(quick, QUICK_ROUNDS if quick else ROUNDS)
+        result.findings.extend(dict.fromkeys(LEFT_OUT))
+        LEFT_OUT.clear()
         files += write_result(result, out)
         show(result.title)
         for finding in result.findings:

@@ -188,15 +188,9 @@ def ray_rates(name: str, points: SurfacePoints, quick: bool, rounds: int) -> tup
     ours = "splitnerf occlusion_factors"
     above = float(((directions.view(n, -1, 3) * points.normals[:, None]).sum(-1) > 0).float().mean())
     what = {ours: "rays made in the lattice's order, those above the horizon traced and counted, weighed and summed"}
-    rows = [
-        [
-            name,
-            call,
-            f"{(above if call == ours else 1) * len(origins) / times[call].median / 1e6:.1f}",
-            what.get(call, "tracing of given rays, independent of one another"),
-        ]
-        for call in calls
-    ]
+    given = "tracing of given rays, independent of one another"
+    rates = {call: (above if call == ours else 1) * len(origins) / times[call].median / 1e6 for call in calls}
+    rows = [[name, call, f"{rate:.1f}", what.get(call, given)] for call, rate in rates.items()]
     findings = []
     for call in (c for c in calls if "splitnerf" not in c):
         ratio = times.ratio(call, ours)

@@ -47,8 +47,8 @@ def commit(sources: Sequence[str] = (), root: Path = ROOT) -> str:
 def command_line() -> str:
     """The command as it was typed; an installed program and absolute paths are shortened to their last part."""
     program = Path(sys.argv[0])
-    first = str(program) if program.suffix == ".py" and not program.is_absolute() else program.name
-    return shlex.join([first, *(Path(word).name if word.startswith("/") else word for word in sys.argv[1:])])
+    first = f"python {program}" if program.suffix == ".py" and not program.is_absolute() else program.name
+    return " ".join([first, *(shlex.quote(Path(word).name if word.startswith("/") else word) for word in sys.argv[1:])])
 
 
 def provenance(sources: Sequence[str], command: str | None = None, root: Path = ROOT) -> dict[str, str]:

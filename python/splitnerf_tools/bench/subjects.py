@@ -1,6 +1,6 @@
 """What benchmarks measure on: environment maps in the forms that estimators read, meshes, and other libraries.
 
-Each library is optional: a missing one is left out, with a note on stderr.
+Each library is optional: a missing one is left out, with a note on stderr and on the page.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from torch.nn import functional as F
 # Their brightest ten-thousandth of the sphere sends less than 1 %, 3 % and 57 % of the light.
 MEASURED = {"soft": "blender_courtyard.exr", "medium": "blender_studio.exr", "hard sun": "blender_sunrise.exr"}
 SUBDIVISION, FINEST = 4, 512  # samples along the edge of a texel that its mean is taken from, and of the map, at least
+LEFT_OUT: list[str] = []  # what the page that is being made lacks
 
 
 def data_folder() -> Path:
@@ -43,12 +44,9 @@ def procedural_sky(height: int, sun: float) -> np.ndarray:
     radiance."""
     polar = (np.arange(height) + 0.5) / height * np.pi
     azimuth = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    d = np.stack(
-        np.broadcast_arrays(
-            np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth), np.cos(polar)[:, None]
-        ),
-        axis=-1,
-    )
+    sine = np.sin(polar)[:, None]
+    d = np.broadcast_arrays(sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)[:, None])
+    d = np.stack(d, axis=-1)
     up = d[..., 2:]
     sky = np.where(up > 0, [0.4, 0.6, 1.0] * (0.5 + up), np.array([0.3, 0.25, 0.2]) * (1 + 0.5 * up))
     for axis, width, level in (([1, 0, 0.3], 0.25, 6.0), ([-0.5, -0.8, 0.4], 0.15, 12.0)):
@@ -143,13 +141,18 @@ def bumpy_sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
         np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij"
     )
     radius = 1 + 0.15 * np.sin(9 * polar) * np.cos(11 * azimuth)
-    vertices = radius[..., None] * np.stack(
-        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1
-    )
+    sine = np.sin(polar)
+    vertices = radius[..., None] * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)], -1)
     index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
     return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.int32)
+
+
+def leave_out(text: str) -> None:
+    """Says what is missing, and keeps it for the page."""
+    LEFT_OUT.append(text)
+    note(text)
 
 
 def peer(name: str, why: str) -> object | None:
@@ -157,7 +160,7 @@ def peer(name: str, why: str) -> object | None:
     try:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
-        note(f"{name} is not installed ({str(error).splitlines()[0]}): {why} is left out")
+        leave_out(f"{name} is not installed ({str(error).splitlines()[0]}): {why} is left out")
         return None
 
 
@@ -173,5 +176,5 @@ def drjit_ready() -> bool:
 
     if drjit.has_backend(drjit.JitBackend.LLVM):
         return True
-    note("Dr.Jit finds no LLVM library; set DRJIT_LIBLLVM_PATH: what needs it is left out")
+    leave_out("Dr.Jit finds no LLVM library; set DRJIT_LIBLLVM_PATH: what needs it is left out")
     return False
