@@ -121,7 +121,7 @@ def camera_poses(n: int, *, split: str) -> np.ndarray:
 
 
 def write_demo_dataset(
-    out: Path, *, size: int = 200, n_train: int = 60, n_test: int = 8, spp: int = 32, seed: int = 0
+    out: Path, *, size: int = 100, n_train: int = 60, n_test: int = 8, spp: int = 64, seed: int = 0
 ) -> Path:
     """Renders the demo scene and writes it as a dataset with truth.
 
