@@ -35,15 +35,8 @@ class Gltf:
     def accessor(self, values, dtype="float32", **extra) -> int:
         values = np.ascontiguousarray(values, dtype)
         values = values.reshape(len(values), -1)
-        self.json["accessors"].append(
-            {
-                "bufferView": self.view(values.tobytes()),
-                "componentType": COMPONENTS[dtype],
-                "count": len(values),
-                "type": KINDS[values.shape[1]],
-            }
-            | extra
-        )
+        content = {"bufferView": self.view(values.tobytes()), "componentType": COMPONENTS[dtype]}
+        self.json["accessors"].append(content | {"count": len(values), "type": KINDS[values.shape[1]]} | extra)
         return len(self.json["accessors"]) - 1
 
     def texture(self, pixels) -> int:
@@ -84,13 +77,8 @@ class Gltf:
         text += b" " * (-len(text) % 4)
         binary = self.binary + b"\0" * (-len(self.binary) % 4)
         size = 12 + 8 + len(text) + 8 + len(binary)
-        path.write_bytes(
-            struct.pack("<4sII", b"glTF", 2, size)
-            + struct.pack("<I4s", len(text), b"JSON")
-            + text
-            + struct.pack("<I4s", len(binary), b"BIN\0")
-            + binary
-        )
+        parts = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+        path.write_bytes(struct.pack("<4sII", b"glTF", 2, size) + parts)
         return path
 
 

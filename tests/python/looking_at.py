@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 import splitnerf_tools
+from PIL import Image
 
 SOURCES = Path(splitnerf_tools.__file__).parent / "pages"
 LOOK = Path(__file__).parents[1] / "viewer/look.mjs"
@@ -59,12 +61,27 @@ def serving(server):
             thread.join()
 
 
+def pixels(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path).convert("RGB"), np.float32) / 255
+
+
+def middle(picture: np.ndarray) -> np.ndarray:
+    """The mean colour of the middle's 10 x 10 pixels."""
+    y, x = picture.shape[0] // 2, picture.shape[1] // 2
+    return picture[y - 5 : y + 5, x - 5 : x + 5].mean(axis=(0, 1))
+
+
 def picture(path: Path, **more: object) -> dict:
     return {"do": "picture", "path": str(path)} | more
 
 
 def keys(*names: str) -> list[dict]:
     return [{"do": "key", "key": name} for name in names]
+
+
+def opened(width: int, height: int, **more: object) -> list[dict]:
+    """A window of that size with the page in it."""
+    return [{"do": "size", "width": width, "height": height} | more, {"do": "open"} | more]
 
 
 def text(name: str, script: str, **more: object) -> dict:

@@ -71,6 +71,12 @@ def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1), faces, process=False)
 
 
+def bowl(subdivisions: int, radius: float = 1.0) -> trimesh.Trimesh:
+    """The lower half of a sphere, faces inwards."""
+    ball = trimesh.creation.icosphere(subdivisions, radius)
+    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
+
+
 def between(mesh: trimesh.Trimesh, n: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Random points on the faces and their interpolated normals."""
     vertices, normals = corners(mesh)

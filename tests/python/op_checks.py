@@ -1,5 +1,7 @@
 """What the tests of all operators share: devices, opcheck, and the refusal of missing gradients."""
 
+from collections.abc import Callable
+
 import pytest
 import torch
 from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
@@ -65,6 +67,16 @@ def as_tuple(x) -> tuple:
 
 def floats(outputs) -> list[torch.Tensor]:
     return [x for x in as_tuple(outputs) if x.is_floating_point()]
+
+
+def on_threads(n: int, call: Callable[[], object]) -> object:
+    """What a call gives on so many threads."""
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(n)
+        return call()
+    finally:
+        torch.set_num_threads(before)
 
 
 def check_error(call, *parts: str) -> None:

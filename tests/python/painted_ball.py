@@ -79,12 +79,7 @@ def bare(mesh: trimesh.Trimesh, *materials: Material) -> Asset:
 
 
 def photos(
-    asset: Asset,
-    environment: np.ndarray,
-    n: int = 10,
-    spp: int = 128,
-    turns: np.ndarray | None = None,
-    sharpness: int = 1,
+    asset: Asset, environment: np.ndarray, n=10, spp=128, turns: np.ndarray | None = None, sharpness=1
 ) -> Dataset:
     """The asset seen from all around, as photos, of `sharpness` times as many pixels along an edge; with `turns` [n, 3, 3] under
     a light that is turned in each."""

@@ -46,12 +46,8 @@ def surface_of(field):
 
     def materials(x):
         rough, metal = 0.5 + 0.3 * x[:, :1], (x[:, 2:] > 0).float()
-        return (
-            torch.from_numpy(albedo_at(x.numpy())),
-            rough,
-            metal,
-            torch.nn.functional.normalize(gradient(x)[1], dim=1),
-        )
+        normal = torch.nn.functional.normalize(gradient(x)[1], dim=1)
+        return torch.from_numpy(albedo_at(x.numpy())), rough, metal, normal
 
     return Surface(field, gradient, materials)
 
@@ -110,13 +106,17 @@ def test_mesh_is_light_closed_and_on_the_surface(baked):
     assert material.roughness == material.metallic == 1.0 and tuple(material.albedo) == (1.0, 1.0, 1.0)
 
 
+def charts_of(faces: np.ndarray) -> tuple[int, np.ndarray]:
+    """The number of charts, and that of each vertex."""
+    edges = np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))
+    return connected_components(coo_matrix(edges, shape=(faces.max() + 1,) * 2), directed=False)
+
+
 def test_charts_do_not_overlap_and_keep_their_distance():
     ball = trimesh.creation.icosphere(subdivisions=3)
     origins, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), SIZE)
     assert np.array_equal(origins[faces], ball.faces) and uv.min() >= 0 and uv.max() <= 1
-    n = len(uv)
-    graph = coo_matrix((np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(n, n))
-    n_charts, chart = connected_components(graph, directed=False)
+    n_charts, chart = charts_of(faces)
     texels = rasterise(uv, faces, SIZE)
     owner = np.full(SIZE * SIZE, -1)
     owner[texels.index] = chart[faces[texels.triangle, 0]]
@@ -146,10 +146,7 @@ def test_charts_are_small_and_fill_a_large_texture():
     """None holds much more than 1 / 64 of the surface; between them lie texels of the texture as it is asked for."""
     ball = trimesh.creation.icosphere(subdivisions=4)
     _, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), 1024)
-    graph = coo_matrix(
-        (np.ones(2 * len(faces)), (faces[:, :2].reshape(-1), faces[:, 1:].reshape(-1))), shape=(len(uv),) * 2
-    )
-    _, chart = connected_components(graph, directed=False)
+    _, chart = charts_of(faces)
     assert np.bincount(chart[faces[:, 0]], ball.area_faces).max() < 2 * ball.area / 64
     assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
 
@@ -192,9 +189,7 @@ def test_occlusion_beside_a_wall():
     faces = np.int32([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     normals = np.float32([[0, 0, 1]] * 4 + [[1, 0, 0]] * 4)
     uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]] + [[2, 2], [3, 2], [3, 3], [2, 3]])  # the wall off the texture
-    tangents, ids = vertex_tangents(vertices, faces, normals, uv), np.zeros(len(faces), np.int32)
-    mesh = Asset("a", vertices, faces, normals, ids, uv=uv, tangents=tangents)
-    occlusion = bake_occlusion(mesh, 128, 1e-3)
+    occlusion = bake_occlusion(unwrapped(vertices, faces, normals, uv), 128, 1e-3)
     d = (np.arange(128) + 0.5) / 64
     expected = 1 - 0.5 * (1 - d / np.sqrt(d**2 + 1))
     assert occlusion.mean(axis=0)[8:-8] == pytest.approx(expected[8:-8], abs=0.02)
@@ -295,13 +290,9 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
     assert vertex_normals(ball(sign=0.0), more, faces)[-1].tolist() == [0, 0, 1]
 
 
-def textured() -> Asset:
-    material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
-    return dataclasses.replace(square(), materials=[material])
-
-
 def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
-    asset = textured()
+    material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
+    asset = dataclasses.replace(square(), materials=[material])
     assert (encode_maps("a", asset, None).orm[..., 0] == 255).all()
     assert (encode_maps("a", asset, np.zeros((4, 4))).orm[..., 0] == 0).all()
     asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
@@ -317,16 +308,10 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]])
 UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
-def test_bitangent_points_up_in_the_texture():
-    """u along +x and, v counting downward, the texture's up along +y: an unmirrored frame."""
-    tangents = vertex_tangents(QUAD, FACES, UP, np.array([[0, 1], [1, 1], [1, 0], [0, 0]]))
-    assert tangents.dtype == np.float32
-    assert tangents == pytest.approx(np.tile([1, 0, 0, 1], (4, 1)), abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("uv", "tangent", "sign"),
     [
+        ([[0, 1], [1, 1], [1, 0], [0, 0]], [1, 0, 0], 1),  # v counts downward, so up is +y = cross(z, x)
         ([[0, 0], [1, 0], [1, 1], [0, 1]], [1, 0, 0], -1),  # v grows along +y: up is -y = -cross(z, x)
         ([[1, 1], [0, 1], [0, 0], [1, 0]], [-1, 0, 0], -1),  # u mirrored, up is +y = -cross(z, -x)
         ([[1, 1], [1, 0], [0, 0], [0, 1]], [0, -1, 0], 1),  # u along -y, up +x = cross(z, -y)
@@ -334,6 +319,7 @@ def test_bitangent_points_up_in_the_texture():
 )
 def test_mirrored_and_turned_textures(uv, tangent, sign):
     tangents = vertex_tangents(QUAD, FACES, UP, np.array(uv, float))
+    assert tangents.dtype == np.float32
     assert tangents == pytest.approx(np.tile([*tangent, sign], (4, 1)), abs=1e-6)
 
 

@@ -22,9 +22,6 @@ def lamp(axis: torch.Tensor, radiance: float = 1e4) -> LightPyramid:
     return light
 
 
-# ---- whose light they hold ----
-
-
 def test_texels_divide_the_sphere():
     """Their middles lie in their texels: a light that is linear in the direction is read there as it is."""
     directions, solid_angles = octahedral_texels(64, torch.device("cpu"))
@@ -55,9 +52,6 @@ def test_few_texels_are_divided():
     near = (sky.centres @ directions.T).max(1)
     at_middle = near.values > math.cos(math.radians(1.0))
     torch.testing.assert_close(cells.radiance[at_middle], light.radiance()[near.indices[at_middle]], rtol=1e-4, atol=0)
-
-
-# ---- where their shadows fall ----
 
 
 def test_the_shadow_of_a_sphere_falls_where_the_sun_throws_it():

@@ -3,7 +3,7 @@
 import pytest
 import torch
 import trimesh
-from mesh_shapes import traced
+from mesh_shapes import bowl, traced
 from op_checks import generator, rand, unit
 from splitnerf.fields.occlusion import bit_counts
 from splitnerf.ops.rays import ShadingSubset
@@ -15,11 +15,6 @@ from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Step
 from test_views import ball
 from tiny_runs import tiny
-
-
-def bowl() -> trimesh.Trimesh:
-    ball = trimesh.creation.icosphere(2, 0.5)
-    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
 
 
 def with_mesh(mesh: trimesh.Trimesh, **settings: object) -> SceneModel:
@@ -68,7 +63,7 @@ def test_the_sum_comes_in_smoothly_over_its_band():
 
 def test_the_sum_holds_what_the_mesh_sends():
     """In a bowl that sends out 1, as the sky does, all is lit by 1: less where the mesh is taken to be dark."""
-    model = with_mesh(bowl())
+    model = with_mesh(bowl(2, 0.5))
     bits = model.bits
     x, n = bits.cache.vertices[::5], bits.cache.normals[::5]
     inner = x[:, 2] < -0.1
@@ -102,7 +97,7 @@ def test_a_new_mesh_is_lit_and_its_light_bounces_three_times(monkeypatch):
     model = SceneModel(tiny(n_levels=2))
     with torch.no_grad():
         model.light.texels[:16] = torch.tensor(3.0).log()
-    mesh = bowl()
+    mesh = bowl(2, 0.5)
     model.use_mesh(traced(model, mesh))
     assert len(asked) == 3
     torch.testing.assert_close(asked[0], torch.full_like(asked[0], 3.0), rtol=1e-4, atol=1e-4)
@@ -202,9 +197,6 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
     assert entropies[0] == entropies[1] > 0
 
 
-# ---- settings ----
-
-
 @pytest.mark.parametrize("name", ["analytic", "finite_difference"])
 def test_normals_are_taken_as_set(name):
     torch.manual_seed(0)
@@ -224,7 +216,7 @@ def test_the_bits_are_made_as_they_are_set():
     """Rays start farther out and see more of the bowl's sky; it counts as open below a share, and sends nothing."""
     settings = {"open_below": 0.9, "indirect": False, "occlusion_directions": 288, "occlusion_channels": 1}
     near, far = (SceneModel(tiny(occlusion_offset=offset, **settings)) for offset in (0.01, 0.2))
-    near, far = (traced(model, bowl()) for model in (near, far))
+    near, far = (traced(model, bowl(2, 0.5)) for model in (near, far))
     assert near.is_unoccluded and near.emitters is None and near.n_channels == 1 and len(near.light) == 288
     blocked = [int(bit_counts(bits.cache.bits[:, 1]).sum()) for bits in (near, far)]
     assert blocked[0] > 1.1 * blocked[1] > 0

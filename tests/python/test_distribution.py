@@ -177,13 +177,8 @@ def test_without_the_cross_compiler_one_line_says_what_to_install(tmp_path):
     for program in ("sh", "dirname"):
         (tmp_path / program).symlink_to(shutil.which(program))
     script = THIRD_PARTY / "build_aarch64_wheels.sh"
-    done = subprocess.run(
-        ["sh", str(script), str(tmp_path / "out")],
-        check=False,
-        env={"PATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-    )
+    words, alone = ["sh", str(script), str(tmp_path / "out")], {"PATH": str(tmp_path)}
+    done = subprocess.run(words, check=False, env=alone, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr == "the cross compiler is missing: apt-get install g++-aarch64-linux-gnu\n"
     assert not (tmp_path / "out").exists()

@@ -180,23 +180,20 @@ def test_kernels_below_the_processor(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("architectures", "capability", "covered"),
+    ("architectures", "covered", "others"),
     [
-        ("90-real", (9, 0), True),
-        ("90-real", (10, 0), False),
-        ("80-real, 90", (8, 6), True),
-        ("80-real, 90", (12, 0), True),
-        ("80-real, 90", (7, 5), False),
-        ("86-real", (8, 0), False),
-        ("80-virtual", (7, 5), False),
-        ("90a-real", (9, 0), True),
-        ("80-virtual", (8, 9), True),
-        ("100-real", (10, 3), True),
-        ("", (9, 0), False),
+        ("90-real", [(9, 0)], [(10, 0)]),
+        ("80-real, 90", [(8, 6), (12, 0)], [(7, 5)]),
+        ("86-real", [], [(8, 0)]),
+        ("80-virtual", [(8, 9)], [(7, 5)]),
+        ("90a-real", [(9, 0)], []),
+        ("100-real", [(10, 3)], []),
+        ("", [], [(9, 0)]),
     ],
 )
-def test_which_gpus_kernels_run_on(architectures, capability, covered):
-    assert devices.covers(architectures, *capability) == covered
+def test_which_gpus_kernels_run_on(architectures, covered, others):
+    assert all(devices.covers(architectures, *capability) for capability in covered)
+    assert not any(devices.covers(architectures, *capability) for capability in others)
 
 
 def test_gpus(monkeypatch):

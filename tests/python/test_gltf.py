@@ -121,19 +121,14 @@ def test_materials_textures_and_colour_spaces(path):
     gltf = Gltf()
     levels = np.random.default_rng(0).integers(0, 256, (4, 2, 3)) / 255
     slot = {"index": gltf.texture(levels)}
+    factors = {"baseColorFactor": [0.123456789, 0.5, 0.7, 0.3], "roughnessFactor": 0.345678901, "metallicFactor": 0.25}
     textured = gltf.material(
         name="painted",
         emissiveFactor=[0.25, 0.5, 1.0],
         emissiveTexture=slot,
         normalTexture=slot | {"scale": 0.5},
         extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
-        pbrMetallicRoughness={
-            "baseColorFactor": [0.123456789, 0.5, 0.7, 0.3],
-            "roughnessFactor": 0.345678901,
-            "metallicFactor": 0.25,
-            "baseColorTexture": slot,
-            "metallicRoughnessTexture": slot,
-        },
+        pbrMetallicRoughness=factors | {"baseColorTexture": slot, "metallicRoughnessTexture": slot},
     )
     plain = gltf.material(name="plain", pbrMetallicRoughness={"roughnessFactor": 0.5})
     normal = {"NORMAL": [[0, 0, 1]] * 3}
@@ -235,15 +230,10 @@ def test_repairs_are_said(path, capsys):
 # ---- buffers in files of their own ----
 
 
-@pytest.mark.parametrize(
-    "uri",
-    [
-        "sub/the%20data.bin",
-        "./sub/../sub/the%20data.bin",
-        "inside.bin",
-        "data:application/octet-stream;base64,{inline}",
-    ],
-)
+INLINE = "data:application/octet-stream;base64,{inline}"
+
+
+@pytest.mark.parametrize("uri", ["sub/the%20data.bin", "./sub/../sub/the%20data.bin", "inside.bin", INLINE])
 def test_buffers_below_the_folder_are_read(tmp_path, uri):
     whole = read_asset(triangle().write(tmp_path / "a.glb"))
     assert np.array_equal(read_asset(beside(tmp_path, uri)).vertices, whole.vertices)

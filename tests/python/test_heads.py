@@ -65,9 +65,6 @@ def test_a_roughness_at_the_end_of_its_range_can_be_learned(initial, least, expe
     assert metallic.item() == pytest.approx(1 / (1 + math.exp(2)))
 
 
-# ---- occlusion ----
-
-
 def factors_of(head: OcclusionHead) -> Occlusion:
     return head([torch.randn(40, 7, generator=generator(3))])
 

@@ -94,9 +94,6 @@ def test_a_black_mask_of_one_bit_a_pixel_is_as_small_as_that(tmp_path):
     assert images.read_image(tmp_path / "mask.png").shape == (2000, 2000, 1)
 
 
-# ---- environment maps ----
-
-
 def write_raw(path, pixels):
     """Writes floats as they are, NaN and negative ones too."""
     sink = oiio.ImageOutput.create(str(path))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from blender_data import ANGLE, SIZE, edit, make_blender, write_exr
+from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, write_exr
 from PIL import Image, ImageCms
 from splitnerf import errors
 from splitnerf.cli import DONE, main
@@ -193,14 +193,8 @@ def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
     buffer = io.BytesIO()
     image.save(buffer, "png")
     whole = buffer.getvalue()
-    return (
-        whole[:33]
-        + struct.pack(">I", len(data))
-        + kind
-        + data
-        + struct.pack(">I", zlib.crc32(kind + data))
-        + whole[33:]
-    )
+    chunk = struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return whole[:33] + chunk + whole[33:]
 
 
 @pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
@@ -319,14 +313,7 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
 
 
 def test_found_masks_have_names_of_their_own():
-    images = [
-        "cam0/images/0.jpg",
-        "cam1/images/0.jpg",
-        "cam1/images/0.png",
-        "cam1/0.jpg",
-        "../cam1/0.jpg",
-        "cam1_images/0.jpg",
-    ]
+    images = "cam0/images/0.jpg cam1/images/0.jpg cam1/images/0.png cam1/0.jpg ../cam1/0.jpg cam1_images/0.jpg".split()
     names = [separated_mask(Path("data") / image, Path("data")) for image in images]
     assert len(set(names)) == len(images) and all(name.suffix == ".png" and ".." not in name.parts for name in names)
 
@@ -373,12 +360,7 @@ def test_a_world_that_hangs_is_said(tmp_path):
     ].advice
     turn = np.diag([1.0, -1, -1, 1])
     for frame in range(8):
-        edit(
-            data,
-            lambda meta: meta["frames"][frame].update(
-                transform_matrix=(turn @ meta["frames"][frame]["transform_matrix"]).tolist()
-            ),
-        )
+        edit(data, set_pose(frame, lambda pose: (turn @ pose).tolist()))
     finding = {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"]
     assert finding.value == "(0.00, 0.00, -1.00)" and "turn the data's world" in finding.advice
 

@@ -140,20 +140,15 @@ def test_eval_modes_of_data_that_make_splits(tmp_path):
     assert names(root, "all")[0] == [*train, "r_0", "r_2"]
 
 
+WORDS = {
+    "test": "images/test_001 test/latest train/eval_3 test/train/0 testing/7 test_train/test_0",
+    "train": "images/train_001 Train/contest",
+    None: "latest/contest train_test/0",
+}
+
+
 @pytest.mark.parametrize(
-    ("path", "split"),
-    [
-        ("images/test_001.png", "test"),
-        ("images/train_001.png", "train"),
-        ("test/latest.png", "test"),
-        ("Train/contest.png", "train"),
-        ("train/eval_3.png", "test"),
-        ("test/train/0.png", "train"),
-        ("testing/7.png", "test"),
-        ("latest/contest.png", None),
-        ("train_test/0.png", None),
-        ("test_train/test_0.png", "test"),
-    ],
+    ("path", "split"), [(f"{x}.png", split) for split, all_ in WORDS.items() for x in all_.split()]
 )
 def test_words_in_paths(tmp_path, path, split):
     root = write_transforms(tmp_path / "train")  # the folder's own name does not count

@@ -83,9 +83,6 @@ def test_the_light_loss_is_the_mean_over_queries_of_the_sum_over_channels(form, 
         assert loss.item() == pytest.approx(expected, rel=1e-4)
 
 
-# ---- sums, and what is drawn ----
-
-
 def test_the_gradient_is_that_of_the_weighted_sum():
     """Of 2 x^2 + 5 x - 3 c at x = 3: 17; a term without a gradient is left out."""
     x = torch.tensor(3.0, requires_grad=True)
@@ -94,11 +91,8 @@ def test_the_gradient_is_that_of_the_weighted_sum():
     terms.add({"c": -3.0}, torch.tensor(1.0))
     terms.backward()
     assert x.grad.item() == pytest.approx(17.0)
-    assert {name: (weight, value.item()) for name, (weight, value) in terms.items()} == {
-        "a": (2, 9),
-        "b": (5, 3),
-        "c": (-3, 1),
-    }
+    found = {name: (weight, value.item()) for name, (weight, value) in terms.items()}
+    assert found == {"a": (2, 9), "b": (5, 3), "c": (-3, 1)}
 
 
 def test_shares_that_are_not_finite_do_not_stop_the_draw_of_materials():
@@ -132,14 +126,9 @@ def occlusion_rays(n: int) -> SimpleNamespace:
     number = torch.arange(float(n))
     column = number[:, None]
     points = SimpleNamespace(roughness=column, occlusion_d=0.5 + 0.002 * column, occlusion_s=0.5 - 0.004 * column)
-    return SimpleNamespace(
-        shaded=torch.arange(n),
-        shares=1.0 + number,
-        positions=column.expand(-1, 3),
-        sdf=torch.full((n,), 0.5),
-        normals=column + torch.tensor([0.0, 0.5, 0.0]),
-        points=points,
-    )
+    normals, sdf = column + torch.tensor([0.0, 0.5, 0.0]), torch.full((n,), 0.5)
+    rest = {"shaded": torch.arange(n), "shares": 1.0 + number, "positions": column.expand(-1, 3)}
+    return SimpleNamespace(**rest, sdf=sdf, normals=normals, points=points)
 
 
 def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):
@@ -200,9 +189,6 @@ def test_the_light_is_asked_by_the_runs_own_generator(light_set):
         torch.testing.assert_close(directions.norm(dim=1), torch.ones(len(directions)))
         assert directions.mean(0).norm() < 0.2
     assert len(normals) == 256 and (asked[1][1] == 1).all()
-
-
-# ---- where the slopes go ----
 
 
 def test_similar_materials_attract_each_other():

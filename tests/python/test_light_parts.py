@@ -12,9 +12,6 @@ from splitnerf.fields import light as lights
 from splitnerf.fields.light import chain_resolution, is_resolved, lobe_roughness, panorama_directions, pyramid_filters
 from splitnerf.ops.light import sh_projection
 
-# ---- evaluated lights ----
-
-
 CELLS = SkyCells(64)
 W, RHO = unit(torch.randn(30, 3, generator=generator(1))), torch.rand(30, 1, generator=generator(2))
 
@@ -101,9 +98,6 @@ def evaluated_once(light: Light) -> tuple[torch.Tensor, ...]:
     return shared.leaves
 
 
-# ---- panoramas, and widths ----
-
-
 class Painted(Light):
     """The direction as a colour, and the roughness as a fourth of it, so that it shows."""
 
@@ -132,9 +126,6 @@ def test_a_lobe_as_wide_as_the_sphere_is_rough():
         assert lobe_roughness(solid_angle) == pytest.approx(roughness)
         assert lobe_roughness(torch.tensor([solid_angle])).item() == pytest.approx(roughness)
     assert lobe_roughness(50.0) == 1.0 == lobe_roughness(torch.tensor([50.0])).item()
-
-
-# ---- the pyramid's maps ----
 
 
 @pytest.mark.parametrize(

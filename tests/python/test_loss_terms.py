@@ -66,8 +66,6 @@ def test_colours_that_are_added_in_linear_light_are_compared_in_srgb(rendered):
     assert (linear.colour - ray.colour).abs().max() > 0.1
 
 
-# ---- all terms at once, each with a weight of its own ----
-
 WEIGHTS = dict(colour_weight=0.11, eikonal_weight=0.13, mask_weight=0.17, light_weight=0.19, neutral_weight=0.23)
 WEIGHTS |= dict(smoothness_weight=0.29, entropy_weight=0.31, metal_weight=0.37)
 WEIGHTS |= dict(dark_metal_weight=0.43, occlusion_weight=0.47, light_prior_weight=0.53)

@@ -44,9 +44,6 @@ def test_growth_leads_to_the_finest_resolution():
     assert [spec.levels()[0][0], spec.levels()[-1][0]] == [16, 512]
 
 
-# ---- tables of 16 bits ----
-
-
 def exact_inputs(device, n: int = 200) -> tuple:
     """Positions and a table of multiples of 1/64 in [-1, 1], which float32 and float16 both have."""
     positions, table, *_ = hash_inputs(device, torch.float32, n)
@@ -104,9 +101,6 @@ def test_a_table_and_a_copy_of_other_dtypes_or_sizes_are_named():
     check_error(lambda: HashGrid(HASH_SPEC, table_dtype=torch.float64), "table_dtype", "float16", "float64")
 
 
-# ---- the module ----
-
-
 def test_the_module_reads_a_copy_that_follows_the_parameter():
     grid, x = HashGrid(HASH_SPEC, 1.0, torch.float16), torch.rand(50, 3, generator=generator())
     assert list(grid.state_dict()) == ["table"] and grid.table.dtype == torch.float32
@@ -142,9 +136,6 @@ def test_what_16_bits_cannot_hold_becomes_their_largest_number():
     assert stored[:8].isfinite().all() and stored[8, 0].isnan()
     assert stored[:8, 0].tolist() == [65504.0] * 7 + [0.0]
     assert torch.equal(stored[:8, 1], -stored[:8, 0])
-
-
-# ---- the distance field ----
 
 
 def exact_field(table_dtype=None) -> SdfField:

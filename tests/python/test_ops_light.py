@@ -24,9 +24,6 @@ def test_the_seed_decides_the_samples_of_a_lobe():
     assert torch.equal(first, again) and not torch.equal(first, other)
 
 
-# ---- gbar against a million samples of the lobe ----
-
-
 def lamp(w: torch.Tensor) -> torch.Tensor:
     """A lamp of 12 degrees over a dim sky."""
     axis = unit(torch.tensor([[0.4, -0.2, 0.8]], dtype=w.dtype))

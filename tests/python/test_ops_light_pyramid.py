@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 from op_cases import LIGHT_NODES, lookup_inputs, octahedral_directions
-from op_checks import check_error, generator, lib, unit
+from op_checks import check_error, generator, lib, on_threads, unit
 from splitnerf import _core
 from splitnerf.ops.light import (
     SparseMap,
@@ -55,16 +55,8 @@ def test_many_points_agree_with_few_and_do_not_depend_on_threads():
     few = light_lookup(inputs[0][:37], inputs[1][:37], *inputs[2:])
     torch.testing.assert_close(light_lookup(*inputs)[:37], few, rtol=1e-6, atol=1e-6)
     grad = torch.randn(5000, 3, generator=generator(4))
-    threads = torch.get_num_threads()
-    try:
-        results = []
-        for n in (1, 3):
-            torch.set_num_threads(n)
-            results.append(lib.light_lookup_backward(*inputs, grad))
-    finally:
-        torch.set_num_threads(threads)
-    for one, three in zip(*results):
-        assert torch.equal(one, three)
+    results = [on_threads(n, lambda: lib.light_lookup_backward(*inputs, grad)) for n in (1, 3)]
+    assert all(map(torch.equal, *results))
 
 
 def test_the_lookup_is_continuous_across_every_seam_and_node():

@@ -54,8 +54,6 @@ def test_numbers_that_are_out_of_range_stay_within_the_photos():
     assert drawn([-3.0, 2.0], 0)[3].tolist() == [0, 39] and drawn([-3.0, 2.0], 2)[3].tolist() == [1, 36]
 
 
-# ---- what photos show ----
-
 EXPOSURES = torch.tensor([[1.0, 2, 3], [4, 5, 6]])
 RANDOM = 0.1 * torch.arange(12.0).view(4, 3)
 EDGES = EdgeRuns(

@@ -7,8 +7,6 @@ from ray_inputs import packed_samples, surface_inputs
 from splitnerf.ops import composite, surface_weights
 from splitnerf.ops.rays import PackedSamples, spread_samples
 
-# ---- surface_weights ----
-
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_samples_of_no_ray_count_for_nothing(dtype):
@@ -31,9 +29,6 @@ def test_samples_of_no_ray_count_for_nothing(dtype):
         assert torch.equal(a[:n], b) and not a[n:].any()
     for a, b in zip(alike, same):
         torch.testing.assert_close(a, b)
-
-
-# ---- spread_samples, interpolate ----
 
 
 @pytest.mark.parametrize("per_ray", [1, 3, 7])
@@ -149,6 +144,3 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
     assert (rays[spread.shaded[spread.first]] == rays).all() and (rays[spread.shaded[spread.second]] == rays).all()
     shares = spread.gather(weights)
     torch.testing.assert_close(shares @ values[spread.shaded], weights @ got)
-
-
-# ---- composite ----

@@ -19,8 +19,6 @@ from splitnerf.ops.shading import (
 )
 from stability.cases import drawn_directions
 
-# ---- the split sum ----
-
 
 def test_table_made_in_inference_mode_serves_training():
     shading._brdf_lut.cache_clear()
@@ -33,20 +31,10 @@ def test_table_made_in_inference_mode_serves_training():
 
 def test_an_option_that_is_not_known_is_named():
     inputs = split_sum_inputs("cpu", torch.float32)
-    check_error(
-        lambda: split_sum_shade(**dict(zip(SHADED, inputs)), fresnel_mode="fast"),
-        "split_sum_shade",
-        "fresnel_mode",
-        "exact",
-        "fast",
-    )
-    check_error(
-        lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median"),
-        "light_queries",
-        "query",
-        "mean",
-        "median",
-    )
+    shade = lambda: split_sum_shade(**dict(zip(SHADED, inputs)), fresnel_mode="fast")
+    check_error(shade, "split_sum_shade", "fresnel_mode", "exact", "fast")
+    ask = lambda: light_queries(*query_inputs("cpu", torch.float32)[:3], "median")
+    check_error(ask, "light_queries", "query", "mean", "median")
 
 
 @pytest.mark.parametrize("compensate", [False, True])
@@ -63,9 +51,6 @@ def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
         out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate, None, None)
         found.append([torch.autograd.grad(x, roughness, retain_graph=True)[0].item() for x in out[0]])
     assert found[0] == pytest.approx(found[1], rel=1e-5)
-
-
-# ---- sums over light ----
 
 
 def at(n_dot_v: float, roughness: float, dtype=torch.float64) -> tuple:
@@ -97,9 +82,6 @@ def test_a_normal_that_faces_away_is_turned():
     flipped = monte_carlo_light(-normals, view_dirs, roughness, directions, pdf, radiance)
     for a, b in zip(flipped, monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)):
         torch.testing.assert_close(a, b)
-
-
-# ---- what is reflected of them ----
 
 
 @pytest.mark.parametrize("compensate", [False, True])

@@ -115,7 +115,6 @@ def test_bounces_and_their_bound_are_as_asked():
     "material, message",
     [
         (Material(roughness=1.5), "material factors must lie in"),
-        (Material(albedo_texture=np.full((2, 2, 3), 2, np.float32)), "albedo textures must lie in"),
         (Material(normal_texture=np.full((2, 2, 3), np.nan, np.float32)), "normal textures must be finite"),
         (Material(roughness_metallic_texture=np.zeros((2, 2, 3), np.float32)), "roughness_metallic_texture must be"),
     ],
@@ -123,13 +122,6 @@ def test_bounces_and_their_bound_are_as_asked():
 def test_unusable_materials_are_refused(material, message):
     with pytest.raises(ValueError, match=message):
         AssetRenderer(square(material))
-
-
-def test_textures_need_coordinates():
-    asset = square(Material(albedo_texture=np.ones((2, 2, 3), np.float32)))
-    asset.uv = None
-    with pytest.raises(ValueError, match="textures need uv"):
-        render(asset, spp=1)
 
 
 @pytest.mark.skipif(not _core.embree_version(), reason="needs the build with Embree: rays one by one are too slow")

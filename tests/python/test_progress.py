@@ -83,9 +83,6 @@ def test_the_first_signal_asks_and_the_second_is_as_before(number):
             signal.signal(s, handler)
 
 
-# ---- TensorBoard ----
-
-
 def test_scalars_and_previews_are_written(data, tmp_path):
     pytest.importorskip("tensorboard", reason="needs tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator

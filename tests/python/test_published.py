@@ -122,12 +122,8 @@ def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, 
     (root / "train_mask").mkdir(parents=True)
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
-    frame = {
-        "scene_name": "cup_scene004",
-        "file_path": "test/0003",
-        "camera_angle_x": 0.4,
-        "transform_matrix": pose.tolist(),
-    }
+    frame = {"scene_name": "cup_scene004", "file_path": "test/0003"}
+    frame |= {"camera_angle_x": 0.4, "transform_matrix": pose.tolist()}
     for name in ("train", "novel"):
         (root / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
     write_image(root.with_name("cup_scene004") / "test/0003.exr", np.ones((8, 8, 3), np.float32))

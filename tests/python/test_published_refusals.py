@@ -50,9 +50,6 @@ def capture(folder, suffix: str, photo: np.ndarray, novel: str | None = None):
     return folder
 
 
-# ---- Stanford-ORB ----
-
-
 def test_orb_reads_lights_where_the_truth_lies(tmp_path):
     root = capture(tmp_path / "blender_HDR/a_scene001", ".exr", picture(), "a_scene002")
     capture(tmp_path / "blender_HDR/a_scene002", ".exr", picture())
@@ -79,9 +76,6 @@ def test_orb_has_no_score_of_an_empty_mask():
     thin[4:6] = 1  # nothing is left of it
     assert stanford_orb.image_psnr(picture(), picture(1), thin, scaled=True) == (None, None)
     assert stanford_orb.normal_distance(picture(), picture(1), thin) is None
-
-
-# ---- Shiny Blender ----
 
 
 def transforms(folder, names: dict[str, list], **changes):

@@ -36,15 +36,7 @@ LIGHTS = {
         + 1e4 * (np.arange(2 * rows * rows) == draw.integers(2 * rows * rows)).reshape(rows, 2 * rows, 1) * np.ones(3)
     ),
 }
-FAULTS = ("none",) * 10 + (
-    "black photo",
-    "white photos",
-    "no masks",
-    "swapped cameras",
-    "one place",
-    "far away",
-    "tiny",
-)
+FAULTS = ["none"] * 10 + "black photo, white photos, no masks, swapped cameras, one place, far away, tiny".split(", ")
 
 
 @dataclass
@@ -60,14 +52,9 @@ def random_scene(seed: int, folder: Path) -> Drawn:
     draw = np.random.default_rng(seed)
     pick = lambda choices: list(choices)[draw.integers(len(choices))]
     light, fault, built_in = pick(LIGHTS), pick(FAULTS), draw.random() < 0.3
-    settings = SynthSettings(
-        size=int(np.exp(draw.uniform(np.log(4), np.log(120)))),
-        train=int(np.exp(draw.uniform(np.log(1.8), np.log(60)))),
-        test=int(draw.integers(1, 4)),
-        spp=int(pick((1, 4, 16))),
-        layout=pick(("blender", "blender", *WRITERS)),
-        seed=seed,
-    )
+    size, train = (int(np.exp(draw.uniform(np.log(a), np.log(b)))) for a, b in ((4, 120), (1.8, 60)))
+    test, spp, layout = int(draw.integers(1, 4)), int(pick((1, 4, 16))), pick(("blender", "blender", *WRITERS))
+    settings = SynthSettings(size=size, train=train, test=test, spp=spp, layout=layout, seed=seed)
     fault = fault if settings.layout == "blender" else "none"
     if built_in:
         parts = [pick(SHAPES)]

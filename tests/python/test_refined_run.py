@@ -5,7 +5,6 @@ import json
 import re
 import shutil
 import signal
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from painted_ball import sky, with_textures
 from splitnerf import pipeline, progress
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from splitnerf.cli.common import print_refinement
+from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image
 from splitnerf.data.tensor_files import read_tensors
@@ -73,8 +73,6 @@ def test_what_is_delivered_is_what_is_scored(run, data):
     """By path tracing, the light with it; a later evaluation says the same."""
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["scored"] == "asset" and scores["spp"] == Protocol.spp
-    from splitnerf.data.dataset import load_dataset
-
     own = score_asset(
         read_asset(run / "mesh.glb"), read_image(run / "environment.exr"), load_dataset(data, "test"), {}, Protocol.spp
     ).scores
@@ -293,9 +291,8 @@ def test_another_state_is_refused(painted, folder, monkeypatch):
         {"vertices": np.nan * content["vertices"]},
         {"sweeps": [[1.0]]},
         {"outline": [None]},
-        {"fit": content["fit"] | {"light": content["fit"]["light"][1:]}},
+        *({"fit": content["fit"] | {name: content["fit"][name][1:]}} for name in ("light", "unknowns")),
         {"fit": content["fit"] | {"random": {}}},
-        {"fit": content["fit"] | {"unknowns": content["fit"]["unknowns"][1:]}},
         {"fit": None},
     ):
         torch.save(content | broken, folder / "refinement.pt")
@@ -419,38 +416,18 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     summary = pipeline.refinement_summary(folder)
     before, after = summary["photos_psnr"]
     assert after > before and summary["steps"] == 4
-    print_refinement(summary)
-    held = "of photos held out {:.2f} -> {:.2f} dB".format(*summary["held_out_psnr"])
-    assert f"colours {before:.2f} -> {after:.2f} dB, {held}, coverage at the outline" in (
-        said := capsys.readouterr().out
-    )
-    assert "a lamp that training had smeared" not in said
-    print_refinement(summary | {"delivered": 0, "lamp": True})
-    said = capsys.readouterr().out
-    assert "no step helped the photos held out" in said and "a lamp that training had smeared" in said
-    for with_texture in (False, True):
-        print_refinement(summary | {"normal_texture": with_texture})
-        assert ("no normal texture is delivered" in capsys.readouterr().out) != with_texture
-    print_refinement(None)
-    assert capsys.readouterr().out == ""
-
-
-class Pictures(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def handle_starttag(self, tag, attributes):
-        if tag == "img":
-            self.found.append(dict(attributes)["alt"])
+    for changes, told in (
+        ({}, f"{after:.2f} dB"),
+        ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),
+    ):
+        print_refinement(summary | changes)
+        assert told in capsys.readouterr().out
 
 
 def test_the_report_shows_before_and_after(run):
     page = (run / "report.html").read_text()
-    pictures = Pictures()
-    pictures.feed(page)
     for name in ("photo", "before", "after"):
-        assert sum(alt.endswith(f", {name}") for alt in pictures.found) == 2, name  # test views
+        assert len(re.findall(rf'<img[^>]* alt="[^"]*, {name}"', page)) == 2, name  # test views
     for text in ("one factor per colour channel", "are saturated in the photos", "<h2>Refinement</h2>"):
         assert text in page
 
@@ -459,16 +436,8 @@ def test_the_reports_numbers_are_those_of_its_pictures():
     photo = np.full((8, 8, 3), 0.5)
     page = {
         "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1]}],
-        "summary": {
-            "steps": 3,
-            "seconds": 9.0,
-            "photos_psnr": [20.0, 30.0],
-            "outline_error": None,
-            "saturated": 0.125,
-            "lamp": True,
-            "held_out_psnr": [21.0, 29.0],
-            "delivered": 2,
-        },
+        "summary": dict(steps=3, seconds=9.0, outline_error=None, saturated=0.125, lamp=True, delivered=2)
+        | {"photos_psnr": [20.0, 30.0], "held_out_psnr": [21.0, 29.0]},
         "lights": [np.ones((4, 8, 3))] * 2,
     }
     section = refinement_section(page)

@@ -78,16 +78,9 @@ def test_points_read_what_the_path_tracer_reads(ball):
     fit = Refinement(data, asset, sky(), FitSettings())
     triangle, u, v = fit.scene.trace_closest(origins.reshape(-1, 3), directions.reshape(-1, 3))
     samples = texels.sample(triangle, u, v, -directions.reshape(-1, 3))
-    values = torch.from_numpy(
-        np.concatenate(
-            [
-                asset.materials[0].albedo_texture,
-                asset.materials[0].roughness_metallic_texture,
-                asset.materials[0].normal_texture,
-            ],
-            2,
-        )
-    ).view(-1, 8)
+    kinds = ("albedo", "roughness_metallic", "normal")
+    maps = [getattr(asset.materials[0], f"{kind}_texture") for kind in kinds]
+    values = torch.from_numpy(np.concatenate(maps, 2)).view(-1, 8)
     read = (values[samples.footprints.texels] * samples.footprints.weights[..., None]).sum(1)
     found = torch.cat(list(materials_of(read, samples)), 1).view(len(inside), -1, 8).mean(1).numpy()
     names = ("albedo", "roughness", "metallic", "normal")

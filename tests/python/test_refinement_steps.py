@@ -300,12 +300,8 @@ def test_centred_derivatives_say_the_same_with_less_noise():
     plain, of_one = monte_carlo_light(*drawn, light), monte_carlo_light(*drawn, torch.ones_like(light))
     white = white_sums(normals, view, roughness)
     calm, still = centred(plain, of_one, white), centred(of_one, of_one, white)
-    for name, unknown in (
-        ("specular", normals),
-        ("diffuse", normals),
-        ("specular", roughness),
-        ("dielectric", roughness),
-    ):
+    slopes = ("specular", normals), ("diffuse", normals), ("specular", roughness), ("dielectric", roughness)
+    for name, unknown in slopes:
         torch.testing.assert_close(getattr(calm, name), getattr(plain, name), rtol=0, atol=0)
         of_plain, of_calm, of_still = (
             torch.autograd.grad(getattr(sums, name)[:, 0].sum(), unknown, retain_graph=True)[0][:, 0]

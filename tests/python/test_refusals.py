@@ -11,7 +11,7 @@ from gltf_builder import triangle
 from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
-from tiny_runs import command, contents
+from tiny_runs import command, contents, refused
 
 
 @pytest.fixture
@@ -23,18 +23,6 @@ def grey(tmp_path):
 @pytest.fixture
 def asset(tmp_path):
     return triangle().write(tmp_path / "asset.glb")
-
-
-def refused(capsys, *words: object) -> str:
-    """The one line, notes aside, of a command that is refused."""
-    capsys.readouterr()
-    assert command(*words) == BAD_INPUT
-    (error,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
-    assert error.startswith("splitnerf: ")
-    return error
-
-
-# ---- relight ----
 
 
 def relit(asset, *words: object) -> list[object]:
@@ -82,25 +70,20 @@ def test_a_map_without_a_name_has_no_folder_of_its_own(tmp_path, asset, grey, ca
 
 
 @pytest.mark.parametrize(
-    ("path", "message"),
+    ("content", "n", "message"),
     [
-        ({"w": 0.5, "h": 0.5}, "'w' and 'h' must lie between 1 and 16384, got 0 and 0"),
-        ({"w": 1e9, "h": 1e9}, "'w' and 'h' must lie between 1 and 16384"),
+        ({"w": 0.5, "h": 0.5}, 1, "'w' and 'h' must lie between 1 and 16384, got 0 and 0"),
+        ({"w": 1e9, "h": 1e9}, 1, "'w' and 'h' must lie between 1 and 16384"),
+        ({}, 3, "path.json: has 3 cameras, more than 2; split it"),
     ],
 )
-def test_pictures_of_no_size_or_without_end(tmp_path, asset, grey, capsys, path, message):
-    frames = [{"transform_matrix": np.eye(4).tolist()}]
-    (tmp_path / "path.json").write_text(json.dumps(path | {"camera_angle_x": 1.0, "frames": frames}))
-    words = ["relight", asset, "--spp", "1", "--env", grey, "--path", tmp_path / "path.json", "--out", tmp_path / "out"]
-    assert message in refused(capsys, *words)
-
-
-def test_a_camera_path_has_an_end(tmp_path, asset, grey, capsys, monkeypatch):
+def test_pictures_and_camera_paths_have_an_end(tmp_path, asset, grey, capsys, monkeypatch, content, n, message):
     monkeypatch.setattr("splitnerf.relight.cameras.MOST_VIEWS", 2)
-    frames = [{"transform_matrix": np.eye(4).tolist()}] * 3
-    (tmp_path / "path.json").write_text(json.dumps({"camera_angle_x": 1.0, "frames": frames}))
-    words = relit(asset, "--env", grey, "--path", tmp_path / "path.json", "--out", tmp_path / "out")
-    assert "path.json: has 3 cameras, more than 2; split it" in refused(capsys, *words)
+    frames, path = [{"transform_matrix": np.eye(4).tolist()}] * n, tmp_path / "path.json"
+    path.write_text(json.dumps(content | {"camera_angle_x": 1.0, "frames": frames}))
+    size = () if content else ("--size", "4")
+    words = ["relight", asset, "--spp", "1", *size, "--env", grey, "--path", path, "--out", tmp_path / "out"]
+    assert message in refused(capsys, *words)
 
 
 def test_numbers_of_pictures_and_paths_have_a_limit(tmp_path, asset, grey, capsys):
@@ -130,9 +113,6 @@ def test_an_asset_without_scenes_makes_data(tmp_path, grey):
     assert len(placed.triangles) == len(original.triangles) and np.abs(placed.vertices).max() <= 1.0001
 
 
-# ---- scores ----
-
-
 def test_scores_of_another_run_are_not_replaced(data, other_data, done, tmp_path, capsys):
     run, before = done, contents(done)
     assert "was trained on other images" in refused(capsys, "evaluate", run, "--data", other_data)
@@ -146,26 +126,17 @@ def test_scores_of_another_run_are_not_replaced(data, other_data, done, tmp_path
         assert command(*words) == DONE
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        {"novel_view": 3},
-        {"novel_view": {"psnr": "high"}},
-        {"novel_view": {"psnr": "high", "ssim": 1, "lpips": None}},
-        {"novel_view": None, "f_score": []},
-        {"albedo": None},
-        {"novel_view": {}},
-    ],
-)
+VIEWS = 3, {}, {"psnr": "high"}, {"psnr": "high", "ssim": 1, "lpips": None}
+OTHERS = {"novel_view": None, "f_score": []}, {"albedo": None}
+
+
+@pytest.mark.parametrize("content", [*({"novel_view": x} for x in VIEWS), *OTHERS])
 def test_scores_of_other_types(tmp_path, capsys, content):
     (tmp_path / "evaluation.json").write_text(json.dumps(content))
     error = refused(capsys, "evaluate", tmp_path, "--table", tmp_path / "t.md")
     assert "evaluation.json: is not an evaluation" in error
     (tmp_path / "evaluation.json").write_text(json.dumps({"novel_view": None, "f_score": 0.5}))
     assert main(["evaluate", str(tmp_path)]) == DONE
-
-
-# ---- errors that nobody foresaw ----
 
 
 @pytest.mark.parametrize(

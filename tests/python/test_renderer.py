@@ -30,9 +30,6 @@ def rendered(model: SceneModel, found, **options) -> RenderedRays:
     return render_rays(model, model.evaluate_light(), found, **options)
 
 
-# ---- gradients ----
-
-
 def test_gradients_of_a_picture_are_its_derivatives():
     """To the field, its sharpness, the materials and the light, each along a random direction, of colours and coverage."""
     model, _ = ball()
@@ -62,9 +59,6 @@ def test_gradients_of_a_picture_are_its_derivatives():
         assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-4, abs=1e-5), (
             name
         )
-
-
-# ---- samples ----
 
 
 @pytest.mark.parametrize(("variance", "share"), [(0.3, 1.0), (0.5, 0.3)])
@@ -149,9 +143,6 @@ def test_padding_repeats_the_first_samples_and_changes_nothing():
     assert not nothing.beside.any()
 
 
-# ---- shading ----
-
-
 def test_values_of_shaded_samples_are_those_of_their_places():
     """Some of the samples are shaded, others with another phase; what they stand for adds up to the coverage and the colour."""
     model, cells = ball(**{"sampling.min_weight": 0.0})
@@ -224,9 +215,6 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     candidates, number = asked[0][3:]
     assert (number is None) == (capacity is None) and (number is None or number == n_rays)
     torch.testing.assert_close(x[candidates[:n_rays]], torch.full((n_rays,), 0.5), rtol=0, atol=0.05)
-
-
-# ---- views ----
 
 
 def test_a_view_is_made_of_the_rays_of_its_pixels():

@@ -5,9 +5,9 @@ Skipped where Node, Chromium or the packages of the pages' sources (`npm ci` the
 
 import numpy as np
 import pytest
-from looking_at import look_at, needs_chromium
+from looking_at import look_at, middle, needs_chromium, opened, pixels
+from looking_at import text as say
 from painted_ball import sky, with_textures
-from PIL import Image
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.export.writers import write_glb
 from splitnerf_tools.report import write_report
@@ -28,13 +28,8 @@ def look(page, steps):
 
 
 def plain(colour, alpha=1.0):
-    return {
-        "rgb": np.full((40, 60, 3), colour),
-        "alpha": np.full((40, 60), alpha),
-        "albedo": np.full((40, 60, 3), 0.25),
-        "roughness": np.full((40, 60), 0.5),
-        "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1)),
-    }
+    maps = {"rgb": np.full((40, 60, 3), colour), "alpha": np.full((40, 60), alpha), "roughness": np.full((40, 60), 0.5)}
+    return maps | {"albedo": np.full((40, 60, 3), 0.25), "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1))}
 
 
 @pytest.fixture(scope="module")
@@ -72,24 +67,20 @@ def seen(report):
 
     def click(words, section):
         script = f"[...document.querySelectorAll('#{section} button')].find((b) => b.textContent === '{words}').click()"
-        return {"do": "text", "name": words, "script": script}
+        return say(words, script)
 
     def choose(channel):
         number = CHANNELS.index(channel)
-        return {
-            "do": "text",
-            "name": channel,
-            "script": f"document.querySelectorAll('#object [name=channel]')[{number}].click()",
-        }
+        return say(channel, f"document.querySelectorAll('#object [name=channel]')[{number}].click()")
 
     def light(name):
         script = (
             f"(l => {{ l.selectedIndex = [...l.options].findIndex((o) => o.text === '{name}'); {INPUT} }})({LIGHT})"
         )
-        return {"do": "text", "name": name, "script": script}
+        return say(name, script)
 
     def text(name, selector):
-        return {"do": "text", "name": name, "script": f"document.querySelector('{selector}')?.innerText"}
+        return say(name, f"document.querySelector('{selector}')?.innerText")
 
     def point(selector, x, y, press=False):
         return {"do": "point", "selector": selector, "place": [x, y], "press": press}
@@ -102,16 +93,11 @@ def seen(report):
     maps = [step for name in CHANNELS[1:] for step in (choose(name), part(name, object_))]
     chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
     steps = [
-        {"do": "size", "width": 700, "height": 600},
-        {"do": "open"},
+        *opened(700, 600),
         bare,
-        {"do": "text", "name": "asked", "script": asked},
-        {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
-        {
-            "do": "text",
-            "name": "static",
-            "script": "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length",
-        },
+        say("asked", asked),
+        say("live", "[...document.querySelectorAll('.live')].map((e) => e.id)"),
+        say("static", "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length"),
         part("half", stage),
         point(stage, 0.25, 0.5, press=True),
         part("quarter", stage),
@@ -142,7 +128,7 @@ def seen(report):
         point(f"{terms} .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
         point(f"{terms} .u-over", 0.98, 0.5),
         text("fewer", f"{terms} .tip"),
-        {"do": "text", "name": "linear", "script": f"document.querySelector('{terms} .axis input').click()"},
+        say("linear", f"document.querySelector('{terms} .axis input').click()"),
         point(f"{terms} .u-over", 0.02, 0.5),
         text("zero", f"{terms} .tip"),
         part("shaded", object_),
@@ -153,18 +139,10 @@ def seen(report):
         {"do": "set", "selector": "#object [name=exposure]", "value": 2},
         part("brighter", object_),
         {"do": "size", "width": 380, "height": 700},
-        {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
+        say("overflow", "document.documentElement.scrollWidth - innerWidth"),
     ]
     told = look(report, steps)
-    return told, {
-        path.stem: np.asarray(Image.open(path).convert("RGB"), np.float32) / 255 for path in folder.glob("*.png")
-    }
-
-
-def middle(picture):
-    """The mean colour of the middle's 10 x 10 pixels."""
-    y, x = picture.shape[0] // 2, picture.shape[1] // 2
-    return picture[y - 5 : y + 5, x - 5 : x + 5].mean(axis=(0, 1))
+    return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
 
 def share_of(picture, colour):
@@ -244,10 +222,9 @@ def test_a_narrow_window_does_not_scroll_sideways(seen):
 def test_without_webgl_one_line_takes_the_place_of_the_object(report):
     steps = [
         {"do": "before", "script": NO_WEBGL},
-        {"do": "size", "width": 700, "height": 440},
-        {"do": "open"},
-        {"do": "text", "name": "said", "script": "document.querySelector('#object').innerText"},
-        {"do": "text", "name": "live", "script": "[...document.querySelectorAll('.live')].map((e) => e.id)"},
+        *opened(700, 440),
+        say("said", "document.querySelector('#object').innerText"),
+        say("live", "[...document.querySelectorAll('.live')].map((e) => e.id)"),
     ]
     told = look(report, steps)
     assert told["console"] == [] and told["texts"]["live"] == ["views", "light", "training"]

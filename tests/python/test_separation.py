@@ -10,7 +10,7 @@ import pytest
 import torch
 from blender_data import look_at
 from splitnerf.cli import main
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.normalisation import box_of_views, transform_points
 from splitnerf.data.photos import separated_mask
@@ -35,6 +35,7 @@ from splitnerf_tools.separation.region import CELLS, Region, find_region
 from tiny_runs import train
 
 SIZE, FOCAL = 40, 40.0
+EVERYWHERE = Region(np.ones((CELLS,) * 3, bool), None)
 
 
 class TestRegion:
@@ -130,6 +131,11 @@ def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False) -> list[np.nd
     return masks
 
 
+def photos_of_ball(root) -> tuple[list[np.ndarray], Dataset]:
+    """Eight photos without masks, and the true masks."""
+    return write_ball_on_floor(root, 8), load_dataset(root, reading=Reading("all"), masked=False)
+
+
 class TrueField:
     """The ball on its floor as a field that needs no training; the part that is hidden must be the ball."""
 
@@ -181,11 +187,9 @@ def test_specks_beside_the_object_go():
 
 @pytest.mark.parametrize("size", [(41, 55), (37, 93)])
 def test_masks_of_odd_sizes(tmp_path, size):
-    write_ball_on_floor(tmp_path, 8)
-    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    _, photos = photos_of_ball(tmp_path)
     odd = replace(photos, images=np.ones((8, *size, 4), np.float32), sizes=None)
-    region = Region(np.ones((CELLS,) * 3, bool), None)
-    assert find_mask(TrueField(photos.world_from_box), region, odd, 0).shape == size
+    assert find_mask(TrueField(photos.world_from_box), EVERYWHERE, odd, 0).shape == size
 
 
 def overlap(run, masks: list[np.ndarray]) -> float:
@@ -235,36 +239,33 @@ def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(
 
 def test_no_background_is_told_for_a_photo_that_shows_something_else(tmp_path):
     """Somebody walks through the left half of it."""
-    masks = write_ball_on_floor(tmp_path, 8)
-    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
-    field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
-    mask, alone = with_background(field, region, photos, 0, masks[0].astype(np.float32))
+    masks, photos = photos_of_ball(tmp_path)
+    field = TrueField(photos.world_from_box)
+    mask, alone = with_background(field, EVERYWHERE, photos, 0, masks[0].astype(np.float32))
     np.testing.assert_array_equal(mask > 0.5, masks[0])
     images = np.array(photos.images)
     images[0, :, : SIZE // 2, :3] = 1 - images[0, :, : SIZE // 2, :3]
-    mask, crossed = with_background(field, region, replace(photos, images=images), 0, masks[0].astype(np.float32))
+    mask, crossed = with_background(field, EVERYWHERE, replace(photos, images=images), 0, masks[0].astype(np.float32))
     np.testing.assert_array_equal(mask > 0.5, masks[0])
     assert (alone[..., 3] > 0).sum() > 100 and not crossed.any()
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_photos_without_the_object_and_filled_by_it_tell_no_background(tmp_path, share):
-    write_ball_on_floor(tmp_path, 8)
-    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
-    given, region = np.full((SIZE, SIZE), share, np.float32), Region(np.ones((CELLS,) * 3, bool), None)
-    mask, picture = with_background(RadianceField(), region, photos, 0, given)
+    _, photos = photos_of_ball(tmp_path)
+    given = np.full((SIZE, SIZE), share, np.float32)
+    mask, picture = with_background(RadianceField(), EVERYWHERE, photos, 0, given)
     np.testing.assert_array_equal(mask, given)
     assert picture.shape == (SIZE, SIZE, 4) and not picture.any()
 
 
 def test_what_looks_unlike_its_background_belongs_to_the_mask_beside_it(tmp_path):
     """A mask that lost a rim on one side, as where a mirror looks transparent, gets it back, and nothing else."""
-    masks = write_ball_on_floor(tmp_path, 8)
-    photos = load_dataset(tmp_path, reading=Reading("all"), masked=False)
-    field, region = TrueField(photos.world_from_box), Region(np.ones((CELLS,) * 3, bool), None)
+    masks, photos = photos_of_ball(tmp_path)
+    field = TrueField(photos.world_from_box)
     right = np.flatnonzero(masks[0].any(axis=0)).max()
     cut = masks[0] & (np.arange(SIZE) < right - 4)
-    mask = with_background(field, region, photos, 0, cut.astype(np.float32))[0] > 0.5
+    mask = with_background(field, EVERYWHERE, photos, 0, cut.astype(np.float32))[0] > 0.5
     lost, extra = (masks[0] & ~mask).sum(), (mask & ~masks[0]).sum()
     assert (masks[0] & ~cut).sum() > 40 and lost < 6 and extra < 6
 
@@ -292,8 +293,7 @@ def test_photos_in_other_units_of_radiance(tmp_path, monkeypatch):
 
 
 def test_training_lowers_the_error(tmp_path, monkeypatch):
-    write_ball_on_floor(tmp_path, 8)
-    dataset, told = load_dataset(tmp_path, reading=Reading("all"), masked=False), []
+    (_, dataset), told = photos_of_ball(tmp_path), []
     monkeypatch.setattr(training, "RAYS", 128)
     training.train_field(dataset, steps=150, minutes=0, seed=0, report=lambda share, text: told.append((share, text)))
     psnr = [float(text.split()[3]) for _, text in told]
@@ -301,8 +301,7 @@ def test_training_lowers_the_error(tmp_path, monkeypatch):
 
 
 def test_numbers_that_are_not_finite_end_it(tmp_path, monkeypatch):
-    write_ball_on_floor(tmp_path, 8)
-    dataset = load_dataset(tmp_path, reading=Reading("all"), masked=False)
+    _, dataset = photos_of_ball(tmp_path)
     monkeypatch.setattr(training, "SPREAD_WEIGHT", math.nan)
     with pytest.raises(RuntimeError, match="no longer finite at step 2"):
         training.train_field(dataset, steps=5, minutes=0, seed=0, report=lambda share, text: None)
@@ -422,7 +421,7 @@ class TestFoot:
         )
         found = region.above_table(o, d, torch.tensor([[1.0, 9.0]] * 3))
         torch.testing.assert_close(found, torch.tensor([[1.0, 2.9], [1.0, 9.0], [1.0, 9.0]]))
-        assert torch.equal(Region(np.ones((CELLS,) * 3, bool), None).above_table(o, d, found), found)
+        assert torch.equal(EVERYWHERE.above_table(o, d, found), found)
 
 
 class TestOutline:

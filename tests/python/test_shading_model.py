@@ -48,9 +48,6 @@ def factors(diffuse: float, specular: float, channels: int = 1) -> Occlusion:
     return Occlusion(torch.full((K, channels), diffuse), torch.full((K, channels), specular))
 
 
-# ---- the factors of occlusion ----
-
-
 @pytest.mark.parametrize("channels", [1, 3])
 def test_a_metal_is_darkened_by_what_its_lobe_does_not_see(channels):
     """It has no diffuse part: its radiance is o_s times that of an open place, whatever o_d is."""
@@ -75,8 +72,6 @@ def test_light_of_the_object_itself_comes_in_where_the_sky_does_not():
         torch.testing.assert_close(shade(light, materials, only).radiance, (sky + sent) * unit_light)
         torch.testing.assert_close(shade(dark, materials, only).radiance, sent * unit_light)
 
-
-# ---- Fresnel's term ----
 
 MODES = {"exact": 0, "paper": 1}  # by their numbers in the reference
 

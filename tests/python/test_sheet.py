@@ -27,14 +27,8 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(tmp_path, monkeypatch):
     mask[0] = True
     truths = [ViewTruth("a", colour, grey, 2 * grey, normal, mask)] * 5
     alpha = np.full((HEIGHT, WIDTH), 0.8, np.float32)
-    prediction = {
-        "rgb": 3 * colour,
-        "alpha": alpha,
-        "albedo": 2 * colour,
-        "roughness": 3 * grey,
-        "metallic": grey,
-        "normal": -normal,
-    }
+    prediction = {"rgb": 3 * colour, "alpha": alpha, "albedo": 2 * colour}
+    prediction |= {"roughness": 3 * grey, "metallic": grey, "normal": -normal}
     images = [np.full((HEIGHT, WIDTH, 4), 51 * i, np.uint8) for i in range(5)]
     evaluation = {"relight": {"lsq": {"scale": [2.0] * 3}}, "albedo": {"lsq": {"scale": [0.5, 1.0, 2.0]}}}
     relit = RelitViews({"day": images}, data, 1)

@@ -42,13 +42,8 @@ def cut(root: Path, data: Path) -> Path:
                 l, t, r, b = (round(scale * x) for x in (left, top, right, bottom))
                 write_image(file, pixels[t:b, l:r])
             whole = len(pixels)
-            frame |= {
-                "fl_x": 0.5 * whole / np.tan(0.5 * angle),
-                "cx": whole / 2 - l,
-                "cy": whole / 2 - t,
-                "w": r - l,
-                "h": b - t,
-            }
+            frame |= {"fl_x": 0.5 * whole / np.tan(0.5 * angle), "cx": whole / 2 - l, "cy": whole / 2 - t}
+            frame |= {"w": r - l, "h": b - t}
         path.write_text(json.dumps(content))
     return data
 

@@ -31,17 +31,10 @@ SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48
 
 def open_box() -> trimesh.Trimesh:
     """A box from -0.6 to 0.6 with walls of 0.2, whose cavity of 0.8 x 0.8 x 1 is open above."""
-    walls = [
-        trimesh.creation.box(bounds=b)
-        for b in (
-            [[-0.6, -0.6, -0.6], [0.6, 0.6, -0.4]],
-            [[-0.6, -0.6, -0.4], [-0.4, 0.6, 0.6]],
-            [[0.4, -0.6, -0.4], [0.6, 0.6, 0.6]],
-            [[-0.4, -0.6, -0.4], [0.4, -0.4, 0.6]],
-            [[-0.4, 0.4, -0.4], [0.4, 0.6, 0.6]],
-        )
-    ]
-    return trimesh.util.concatenate(walls)
+    bounds = [[[-0.6, -0.6, -0.6], [0.6, 0.6, -0.4]]]
+    bounds += [[[x, -0.6, -0.4], [x + 0.2, 0.6, 0.6]] for x in (-0.6, 0.4)]
+    bounds += [[[-0.4, y, -0.4], [0.4, y + 0.2, 0.6]] for y in (-0.6, 0.4)]
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=b) for b in bounds])
 
 
 def texture(points: np.ndarray, frequency: float = 18.0) -> np.ndarray:

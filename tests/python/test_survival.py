@@ -245,10 +245,12 @@ def test_a_refused_run_leaves_the_folder_as_it_was(data, other_data, done, capsy
         ["demo", "--max-minutes", "-1", "--overwrite"],
         ["demo", "--seed", "99999999999999999999", "--overwrite"],
         ["demo"],
+        ["train", data],
     ):
         assert command(*words, "--out", done) == BAD_INPUT, words
         assert contents(done) == before, words
-    assert "holds a run already" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.count("holds a run already") == 2 and "--overwrite" in said
 
 
 def test_a_run_whose_model_cannot_be_made_is_not_replaced(data, done, monkeypatch):
@@ -401,12 +403,9 @@ def started(*words: str) -> BaseProcess:
 @pytest.mark.parametrize("n_kills", [5, pytest.param(30, marks=pytest.mark.slow)])
 def test_kills_end_with_the_bits_of_an_unbroken_run(data, tmp_path, n_kills):
     """With -9 and at random moments: while it starts, trains, exports, in the refinement and in the scores."""
-    settings = SMALL | {
-        "refinement.enabled": True,
-        "refinement_sweeps": 2,
-        "checkpoint_minutes": 0.0,
-        "mesh_every": 0.2,
-    }
+    settings = (
+        SMALL | {"refinement.enabled": True, "refinement_sweeps": 2} | {"checkpoint_minutes": 0.0, "mesh_every": 0.2}
+    )
     words = ["train", str(data), "--steps", "40", "--deterministic", "--resume", "auto", *as_options(settings), "--out"]
 
     def state(run: Path) -> dict[str, object]:

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from looking_at import SOURCES, look_at, needs_chromium, picture, serving
+from looking_at import SOURCES, look_at, needs_chromium, opened, picture, pixels, serving
 from painted_ball import lamps, orange
-from PIL import Image
 from splitnerf.cli import main
 from splitnerf.data.images import read_image, write_image
 from splitnerf.evaluate.metrics import psnr
@@ -45,12 +44,10 @@ def pictures(folder: Path, queries: list[str]) -> list[np.ndarray]:
     with serving(ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=folder))) as server:
         for i, query in enumerate(queries):
             path = folder / f"{i}.png"
-            window = {"do": "size", "width": SIZE, "height": SIZE}
-            said = look_at(
-                f"http://127.0.0.1:{server.server_port}/index.html?{query}", [window, {"do": "open"}, picture(path)]
-            )
+            url = f"http://127.0.0.1:{server.server_port}/index.html?{query}"
+            said = look_at(url, [*opened(SIZE, SIZE), picture(path)])
             assert [line for line in said["console"] if line.startswith("error")] == []
-            shown.append(np.asarray(Image.open(path).convert("RGB"), np.float32) / 255)
+            shown.append(pixels(path))
     return shown
 
 

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 import torch
-from looking_at import keys, look_at, needs_chromium, picture, serving, text, wait
+from looking_at import keys, look_at, needs_chromium, opened, picture, pixels, serving, text, wait
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.training.checkpoint import load_checkpoint
@@ -23,7 +23,6 @@ from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import Handler, ViewServer
 from splitnerf_tools.view.training_asset import training_asset
-from test_view_page import pixels
 from tiny_runs import tiny
 from viewer_server import triangle
 
@@ -75,8 +74,7 @@ def walk(data, tmp_path_factory):
         told = look_at(
             server.url,
             [
-                {"do": "size", "width": 820, "height": 560} | RESTLESS,
-                {"do": "open"} | RESTLESS,
+                *opened(820, 560, **RESTLESS),
                 wait(f"{LOADED} && !!document.querySelector('#chart canvas')"),
                 lambda: versions.append(live.shown.sources[0].version),
                 {"do": "focus", "selector": "#checkpoint"} | RESTLESS,
@@ -157,8 +155,7 @@ def test_a_cut_connection_is_said_and_mended(tmp_path, monkeypatch):
         told = look_at(
             first.url,
             [
-                {"do": "size", "width": 500, "height": 400} | RESTLESS,
-                {"do": "open"} | RESTLESS,
+                *opened(500, 400, **RESTLESS),
                 wait(LOADED),
                 cut,
                 wait(f"{LOST}.includes('lost')"),
@@ -194,14 +191,7 @@ def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monke
     monkeypatch.setattr(Handler, "_asset", half)
     with serving(ViewServer(ViewedAssets([folder]))) as server:
         told = look_at(
-            server.url,
-            [
-                {"do": "size", "width": 500, "height": 400} | RESTLESS,
-                {"do": "open"} | RESTLESS,
-                text("said", SAID, **RESTLESS),
-                read.set,
-                wait(LOADED),
-            ],
+            server.url, [*opened(500, 400, **RESTLESS), text("said", SAID, **RESTLESS), read.set, wait(LOADED)]
         )["texts"]
     assert told["said"] == "the connection broke off; what was missing is asked for again once splitnerf answers"
     assert len(asked) == 2

@@ -7,10 +7,9 @@ import json
 
 import numpy as np
 import pytest
-from looking_at import keys, look_at, needs_chromium, serving, wait
+from looking_at import keys, look_at, middle, needs_chromium, opened, pixels, serving, text, wait
 from looking_at import picture as picture_at
 from painted_ball import lamps, looking, with_textures
-from PIL import Image
 from scipy.ndimage import maximum_filter
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.images import area_average, linear_to_srgb, read_image, write_image
@@ -35,10 +34,6 @@ def look(shown, steps, photos=None):
     """What the page says while it does the steps."""
     with serving(ViewServer(shown, photos)) as server:
         return look_at(server.url, steps)
-
-
-def pixels(path):
-    return np.asarray(Image.open(path).convert("RGB"), np.float32) / 255
 
 
 @pytest.fixture(scope="module")
@@ -68,31 +63,21 @@ def seen(run):
     linked = "HTMLAnchorElement.prototype.click = function () { window.saved = this.download; }"
     steps = [
         {"do": "before", "script": linked},
-        {"do": "size", "width": 700, "height": 440},
-        {"do": "open"},
+        *opened(700, 440),
         picture("whole"),
         *keys("s"),
-        {"do": "text", "name": "saved", "script": "window.saved"},
-        {
-            "do": "text",
-            "name": "bar",
-            "script": "(b => [b.textContent, b.offsetWidth])(document.querySelector('.bar3d'))",
-        },
-        {
-            "do": "text",
-            "name": "titles",
-            "script": "[...document.querySelectorAll('#panel [title]')].map((e) => e.title)",
-        },
+        text("saved", "window.saved"),
+        text("bar", "(b => [b.textContent, b.offsetWidth])(document.querySelector('.bar3d'))"),
+        text("titles", "[...document.querySelectorAll('#panel [title]')].map((e) => e.title)"),
         {"do": "set", "selector": "[name=exposure]", "value": 3},
-        {
-            "do": "text",
-            "name": "reset",
-            "script": f"(e => {{ e.dispatchEvent(new Event('dblclick', {{bubbles: true}})); return e.value; }})({EXPOSURE})",
-        },
+        text(
+            "reset",
+            f"(e => {{ e.dispatchEvent(new Event('dblclick', {{bubbles: true}})); return e.value; }})({EXPOSURE})",
+        ),
         *keys("2"),
-        {"do": "text", "name": "greyed", "script": f"[{lit}.matches(':disabled'), {EXPOSURE}.matches(':disabled')]"},
+        text("greyed", f"[{lit}.matches(':disabled'), {EXPOSURE}.matches(':disabled')]"),
         *keys(".", "b", "1"),
-        {"do": "text", "name": "untouched", "script": f"[{EXPOSURE}.value, {background}.checked]"},
+        text("untouched", f"[{EXPOSURE}.value, {background}.checked]"),
         said | {"name": "start"},
         {"do": "style", "content": BARE},
         {"do": "size", "width": SIZE, "height": SIZE},
@@ -106,9 +91,7 @@ def seen(run):
         picture("unfolded"),
         *keys("u", "w"),
         picture("wires"),
-        *keys("w"),
-        *keys("1"),
-        *keys("."),
+        *keys("w", "1", "."),
         picture("brighter"),
         *keys(",", "t"),
         picture("neutral"),
@@ -117,32 +100,26 @@ def seen(run):
         *keys("t"),
         *keys("ArrowLeft", "ArrowUp", "-"),
         picture("moved"),
-        {"do": "text", "name": "home", "script": "document.querySelector('[name=home]').click()"},
+        text("home", "document.querySelector('[name=home]').click()"),
         picture("home"),
         {"do": "drag", "from": [80, 80], "to": [110, 80]},
         picture("dragged"),
         *keys("r"),
-        *(
-            {"do": "key", "key": "a", "restless": True},
-            wait("performance.now() > (window.spun ??= performance.now()) + 1000"),
-        ),
+        {"do": "key", "key": "a", "restless": True},
+        wait("performance.now() > (window.spun ??= performance.now()) + 1000"),
         *keys("a"),
         picture("spun"),
         *keys("r"),
         {"do": "drop", "path": str(folder / "red.hdr")},
         picture("red"),
-        {"do": "text", "name": "light", "script": "document.querySelector('[name=light] option:checked').textContent"},
+        text("light", "document.querySelector('[name=light] option:checked').textContent"),
         {"do": "drop", "path": str(folder / "cut.exr")},
         picture("kept"),
         said | {"name": "damaged"},
         *keys("b"),
         {"do": "set", "selector": "[name=blur]", "value": 0},
         picture("background"),
-        {
-            "do": "text",
-            "name": "sunny",
-            "script": f"{lit}.value = [...{lit}.options].find((o) => o.text === 'sunny').value",
-        },
+        text("sunny", f"{lit}.value = [...{lit}.options].find((o) => o.text === 'sunny').value"),
         *keys("b", "-", "-", "-"),
         picture("shadow"),
         *keys("g"),
@@ -150,8 +127,8 @@ def seen(run):
         *keys("g", "h"),
         {"do": "size", "width": 340, "height": 600},
         picture("narrow"),
-        {"do": "text", "name": "overflow", "script": "document.documentElement.scrollWidth - innerWidth"},
-        {"do": "text", "name": "stage", "script": "[canvas.clientWidth, canvas.clientHeight]"},
+        text("overflow", "document.documentElement.scrollWidth - innerWidth"),
+        text("stage", "[canvas.clientWidth, canvas.clientHeight]"),
     ]
     told = look(ViewedAssets([run]), steps)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
@@ -204,8 +181,7 @@ def through(run, photos):
     bare = {"do": "style", "content": BARE + ".divider, .tag { display: none !important }"}
     chosen = {"do": "text", "script": "document.querySelector('[name=through]').selectedOptions[0].textContent"}
     steps = [
-        {"do": "size", "width": 700, "height": 440},
-        {"do": "open"},
+        *opened(700, 440),
         *keys("n"),
         picture("whole"),
         *keys("r"),
@@ -235,7 +211,7 @@ def through(run, photos):
         picture("noisy"),
         {"do": "set", "selector": "[name=paths]", "value": 256},
         picture("final"),
-        {"do": "text", "name": "said", "script": "document.getElementById('said').textContent"},
+        text("said", "document.getElementById('said').textContent"),
         {"do": "set", "selector": "[name=turn]", "value": TURN},
         picture("turned"),
         *keys("f"),
@@ -267,12 +243,6 @@ def smooth_psnr(picture, traced):
     truth, inside = traced
     full = area_average(inside.astype(np.float32), 8) == 1
     return psnr(area_average(picture, 8), (area_average(truth, 8), full))
-
-
-def middle(picture):
-    """The mean colour of 10 x 10 pixels."""
-    half = SIZE // 2
-    return picture[half - 5 : half + 5, half - 5 : half + 5].mean(axis=(0, 1))
 
 
 def test_the_page_loads_without_a_complaint(seen):
@@ -424,13 +394,11 @@ def test_two_assets_stand_side_by_side(run, ball, tmp_path):
     dark = np.full((64, 64, 3), 0.02, np.float32)
     write_glb(tmp_path / "dark.glb", with_textures(ball, albedo_texture=dark))
     steps = [
-        {"do": "size", "width": 2 * SIZE, "height": SIZE},
-        {"do": "open"},
-        {"do": "text", "name": "names", "script": "document.getElementById('names').innerText"},
+        *opened(2 * SIZE, SIZE),
+        text("names", "document.getElementById('names').innerText"),
         {"do": "style", "content": BARE},
-        {"do": "key", "key": "h"},
-        {"do": "key", "key": "2"},
-        {"do": "picture", "path": str(tmp_path / "two.png")},
+        *keys("h", "2"),
+        picture_at(tmp_path / "two.png"),
     ]
     told = look(ViewedAssets([run, tmp_path / "dark.glb"]), steps)
     picture = pixels(tmp_path / "two.png")

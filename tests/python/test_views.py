@@ -34,15 +34,8 @@ class Given(torch.nn.Module):
 def ball(**settings: object) -> tuple[SceneModel, torch.Tensor]:
     """A model whose field is a ball, nearly, under constant light of 1, and its cells."""
     torch.manual_seed(0)
-    model = SceneModel(
-        tiny(
-            start_levels=4,
-            **{"constants.surface_width": 512},
-            sphere_radius=RADIUS,
-            **{"shading.method": "split"},
-            **settings,
-        )
-    )
+    round_ = {"start_levels": 4, "constants.surface_width": 512, "sphere_radius": RADIUS, "shading.method": "split"}
+    model = SceneModel(tiny(**round_, **settings))
     with torch.no_grad():
         model.variance.fill_(0.5)
         model.light.texels.zero_()
@@ -218,13 +211,8 @@ def test_parts_are_as_large_as_they_are_set():
     field = {"n_levels": 3, "base_resolution": 5, "growth": 1.7, "log2_table_size": 9, "surface_width": 24, "box": 1.3}
     light = {"kind": "mlp", "width": 12, "layers": 4, "activation": "exp"}
     settings = field | {f"light_{key}": value for key, value in light.items()}
-    settings |= {
-        "materials_width": 20,
-        "direction_frequencies": 5,
-        "roughness_frequencies": 2,
-        "shading.method": "split",
-    }
-    settings |= {"occlusion.kind": "mlp", "occlusion_width": 18, "occlusion.channels": 3}
+    settings |= {"materials_width": 20, "direction_frequencies": 5, "roughness_frequencies": 2}
+    settings |= {"shading.method": "split", "occlusion.kind": "mlp", "occlusion_width": 18, "occlusion.channels": 3}
     for inputs, n_inputs in (("outputs", 13), ("grid", 13 + 3 + 6)):
         model = SceneModel(tiny(**settings | {"materials.inputs": inputs}))
         assert model.sdf_field.grid.spec == HashGridSpec(3, 2, 5, 1.7, 9) and model.sdf_field.box == 1.3

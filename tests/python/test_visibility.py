@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from mesh_shapes import OFFSET, cache_of, corners, grid_mesh, lattice, scene_of
+from mesh_shapes import OFFSET, bowl, cache_of, corners, grid_mesh, lattice, scene_of
 from op_cases import cached_occlusion_inputs
 from op_checks import lib
 from splitnerf import _core
@@ -58,16 +58,10 @@ def test_under_a_sphere(height):
         torch.testing.assert_close(o_s, o_d, rtol=0, atol=1e-5)  # the lobe of roughness 1 about n is the cosine's
 
 
-def half_shell(subdivisions: int) -> trimesh.Trimesh:
-    """The lower half of the unit sphere, faces inwards."""
-    ball = trimesh.creation.icosphere(subdivisions)
-    return trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0][:, ::-1])
-
-
 @pytest.mark.parametrize("albedo", [0.3, 0.8, 1.0])
 def test_the_furnace_of_a_bowl(albedo):
     """Each point of half a spherical shell sees as much shell as sky: B = a (1/2 + B/2), so B = a / (2 - a)."""
-    cache = cache_of(half_shell(4), 256, offset=1e-3, with_hits=True)
+    cache = cache_of(bowl(4), 256, offset=1e-3, with_hits=True)
     inner = cache.vertices[:, 2] < -0.15
     radiance = torch.zeros_like(cache.vertices)
     for bounce in range(1, 41):

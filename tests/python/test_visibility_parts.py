@@ -60,9 +60,6 @@ def lit_up(bits: VisibilityBits) -> None:
     bits.set_radiance((0.5 + bits.cache.vertices[bits.emitters.vertices].abs()) * bits.emitters.facing)
 
 
-# ---- a mesh ----
-
-
 def test_the_numbers_of_set_bits():
     words = torch.randint(-(2**31), 2**31, (50, 3), generator=generator(), dtype=torch.int64).to(torch.int32)
     expected = [sum(bin(w & 0xFFFFFFFF).count("1") for w in row) for row in words.tolist()]
@@ -138,9 +135,6 @@ def test_all_of_the_sky_is_seen_from_what_counts_as_convex():
     assert torch.equal(ball.light, torch.ones(256, 3))  # geometry alone before the first light
     visible, sent = ball.visibility(torch.zeros(5, 3), torch.ones(5, 3))
     assert torch.equal(visible, torch.ones(5, 256)) and sent is None
-
-
-# ---- the light ----
 
 
 def test_light_is_averaged_over_the_texels_that_are_nearest_to_a_direction():
@@ -255,9 +249,6 @@ def test_light_of_the_mesh_is_not_asked_for_where_it_does_not_count():
     for bits in (bits_on(dented(), indirect=False), ball):
         refresh(bits, asked, asked, asked)
         assert bits.radiance is None
-
-
-# ---- answers ----
 
 
 @pytest.mark.parametrize("n_channels", [1, 3])

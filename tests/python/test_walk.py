@@ -1,10 +1,6 @@
-"""The walk of a training step: the Python files of the package that it goes through.
-
-python tests/python/test_walk.py    lists them
-"""
+"""The walk of a training step: the Python files of the package that it goes through."""
 
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -44,9 +40,9 @@ def files_of(work: Callable[[], None]) -> Counter[str]:
     return calls
 
 
-def step_files(data: Path, run: Path) -> Counter[str]:
-    """The files of a step of preset cpu that is not logged, with a mesh and at which the light moves."""
-    training = Training(load_dataset(data), tiny(steps=200, open_below=0.0), run, torch.device("cpu"))
+def test_a_step_goes_through_few_files(data, tmp_path):
+    """By now; those of eight steps of preset cpu, with a mesh, in which the light moves and no line is logged."""
+    training = Training(load_dataset(data), tiny(steps=200, open_below=0.0), tmp_path, torch.device("cpu"))
 
     def steps(n: int) -> None:
         for _ in range(n):
@@ -56,30 +52,6 @@ def step_files(data: Path, run: Path) -> Counter[str]:
     steps(21)
     training.mesh.request(training.progress)
     steps(2)
-    calls: Counter[str] = Counter()
-    for _ in range(8):
-        calls += files_of(lambda: steps(1))
-    return calls
-
-
-def test_a_step_goes_through_few_files(data, tmp_path):
-    """By now; the files of a group of steps in which the light moves once and no line is logged."""
-    files = step_files(data, tmp_path)
+    files = files_of(lambda: steps(8))
     assert {"training/loop.py", "training/step.py", "render/renderer.py"} <= files.keys()
     assert len([name for name in files if not name.startswith("ops/")]) <= MOST, sorted(files)
-
-
-def main() -> None:
-    from splitnerf_tools.demo.scene import write_demo_dataset
-
-    with tempfile.TemporaryDirectory() as folder:
-        write_demo_dataset(Path(folder) / "data", size=24, n_train=6, n_test=2, spp=4)
-        files = step_files(Path(folder) / "data", Path(folder))
-    for name, calls in sorted(files.items()):
-        print(f"{calls / 8:6.1f} calls a step  {name}")
-    of_ops = sum(name.startswith("ops/") for name in files)
-    print(f"{len(files)} files: {len(files) - of_ops} and {of_ops} of operators")
-
-
-if __name__ == "__main__":
-    main()

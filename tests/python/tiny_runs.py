@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 
 import torch
-from splitnerf.cli import main
+from pytest import CaptureFixture
+from splitnerf.cli import BAD_INPUT, main
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import Dataset
 from splitnerf.training.loop import Training
@@ -32,19 +33,22 @@ def command(*words: object) -> int:
     return main([str(word) for word in words])
 
 
+def refused(capsys: CaptureFixture, *words: object) -> str:
+    """The one line, notes aside, of a command that is refused."""
+    capsys.readouterr()
+    assert command(*words) == BAD_INPUT
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
+    assert line.startswith("splitnerf: ")
+    return line
+
+
 def train(data: Path, run: Path, *options: str) -> int:
     """`splitnerf train` with small settings; returns its exit code."""
     return main(["train", str(data), "--out", str(run), *as_options(SMALL), *options])
 
 
 def train_scene(
-    dataset: Dataset,
-    config: Config,
-    run: Path,
-    observer: Observer = NOBODY,
-    *,
-    device: str = "cpu",
-    resume: bool = False,
+    dataset: Dataset, config: Config, run: Path, observer: Observer = NOBODY, *, device="cpu", resume=False
 ) -> Training:
     """A training after its last step, in the folder `run`."""
     training = Training(dataset, config, run, torch.device(device), observer)
