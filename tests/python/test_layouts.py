@@ -141,8 +141,8 @@ def test_eval_modes_of_data_that_make_splits(tmp_path):
 
 
 WORDS = {
-    "test": "images/test_001 test/latest train/eval_3 test/train/0 testing/7 test_train/test_0",
-    "train": "images/train_001 Train/contest",
+    "test": "images/test_001 test/latest train/eval_3 testing/7 test_train/test_0",
+    "train": "images/train_001 Train/contest test/train/0",
     None: "latest/contest train_test/0",
 }
 
