@@ -47,7 +47,8 @@ def commit(sources: Sequence[str] = (), root: Path = ROOT) -> str:
 def command_line() -> str:
     """The command as it was typed; an installed program and absolute paths are shortened to their last part."""
     program = Path(sys.argv[0])
-    first = f"python {program}" if program.suffix == ".py" and not program.is_absolute() else program.name
+    name = "splitnerf" if program.name == "__main__.py" else program.name  # of python -m splitnerf
+    first = f"python {program}" if program.suffix == ".py" and not program.is_absolute() else name
     return " ".join([first, *(shlex.quote(Path(word).name if word.startswith("/") else word) for word in sys.argv[1:])])
 
 
