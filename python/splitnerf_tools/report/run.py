@@ -100,6 +100,7 @@ def relit_pictures(asset: Asset, photo: int) -> list[tuple[str, np.ndarray]]:
             view.width,
             view.height,
             spp=RELIT_SPP,
+            clamp_indirect=1.0,  # caustics of few paths are specks
             catcher_height=lowest(asset),
         )
         behind = np.full((view.height, view.width, 3), RELIT_GREY, np.float32)
