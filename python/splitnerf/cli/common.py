@@ -177,7 +177,7 @@ class Stages:
                 f"{run.max_minutes:.3g} minutes, export and scores aside" if run.max_minutes else f"{run.steps} steps"
             )
             if not training.finished:
-                self._say("training", f" on {where}; in all {ends}; results go to {training.run}")
+                self._say("training", f" on {where}; in all {ends}; results go to {plain(str(training.run))}")
         elif event.kind in self._names:
             minutes, seconds = divmod(round(time.monotonic() - self._started), 60)
             self._say(event.kind, f", after {minutes}:{seconds:02d} minutes")

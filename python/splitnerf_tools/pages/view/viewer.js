@@ -85,6 +85,7 @@ export class Viewer extends EventTarget {
   /** Sets what all assets share: the names are those of the panel's fields. */
   set(values) {
     this.values = values;
+    if (values.spin && !this.controls.autoRotate) this.spunAt = performance.now();
     this.controls.autoRotate = values.spin;
     this.renderer.toneMapping = TONES[values.tone];
     for (const view of this.views) view.set(values);
