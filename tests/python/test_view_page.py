@@ -106,7 +106,7 @@ def seen(run):
         picture("dragged"),
         *keys("r"),
         {"do": "key", "key": "a", "restless": True},
-        wait("performance.now() > (window.spun ??= performance.now()) + 1000"),
+        wait("performance.now() > (window.spun ??= performance.now()) + 3000"),
         *keys("a"),
         picture("spun"),
         *keys("r"),
