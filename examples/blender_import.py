@@ -71,6 +71,7 @@ def main(words: list[str]) -> None:
     parser.add_argument("--rotate-env", type=float, default=0, help="degrees, counter-clockwise from above")
     parser.add_argument("--exposure", type=float, default=0, help="stops brighter")
     parser.add_argument("--spp", type=int, default=128)
+    parser.add_argument("--denoise", action="store_true", help="by Open Image Denoise")
     parser.add_argument("--out", default="blender.png")
     parser.add_argument("--blend", help="keep the scene as this .blend too")
     parser.add_argument("--against", help="a PNG of the same view")
@@ -83,7 +84,7 @@ def main(words: list[str]) -> None:
     set_colours(arguments.exposure)
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.samples = "CYCLES", arguments.spp
-    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = arguments.denoise, False
     scene.render.film_transparent = True
     scene.render.filepath = str(Path(arguments.out).resolve())
     scene.render.image_settings.file_format, scene.render.image_settings.color_mode = "PNG", "RGBA"

@@ -11,12 +11,14 @@
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
 Each run becomes rows of PAGE.csv as soon as it ends; the command goes on where it was interrupted. Rows of other minutes or
 images stay. --list says what is missing and how long it takes. Scenes of the folder SPLITNERF_DATA are left out where it is
-not there. A run that fails leaves no row, and the next one begins.
+not there. A run that fails leaves no row, and the next one begins. --blender PYTHON, an interpreter with bpy==5.0.1, has
+Blender's Cycles relight the same views, by examples/blender_import.py; its images are scored as our own are.
 """
 
 import argparse
 import csv
 import datetime
+import json
 import os
 import shutil
 import subprocess
@@ -26,8 +28,10 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import read_json
+from splitnerf.evaluate.scoring import Protocol, RelitViews, choose_views, relight_scores
 from splitnerf.files import atomic_path
 from splitnerf.refinement.refine import source_of
 from splitnerf_tools.bench.charts import write_csv
@@ -45,6 +49,7 @@ SCORES = {  # column: the evaluation's keys, digits
     "relit, dB": (("relight", "psnr"), 1),
     "albedo, dB": (("albedo", "psnr"), 1),
     "unscaled relit, dB": (("relight", "raw", "psnr"), 1),
+    "relit by Blender, dB": (("blender", "psnr"), 1),
     "novel views, dB": (("novel_view", "psnr"), 1),
     "normals, degrees": (("normal_mae_deg",), 1),
     "roughness": (("roughness_mae",), 2),
@@ -137,7 +142,30 @@ def data_of(scene: str, size: int, work: Path) -> Path | None:
     return data if splitnerf("synth", *words, "--out", data, *counts) else None
 
 
-def rows_of(scene: str, settings: str, minutes: float, seed: int, page: Page, work: Path) -> list[Row]:
+def relit_by_blender(python: Path, asset: Path, data: Path, work: Path, n_views: int = 6, spp: int = 64) -> dict:
+    """The scores of an asset's views under the data's maps, rendered and denoised by Cycles; empty where there is no map."""
+    views, maps = choose_views(load_dataset(data, "test"), Protocol(views=n_views))
+    if not maps:
+        return {}
+    cameras, picture, images = work / "cameras.json", work / "blender.png", {name: [] for name in maps}
+    keys = "fl_x", "fl_y", "cx", "cy"
+    frames = [
+        {"transform_matrix": pose.tolist(), "w": views.width, "h": views.height} | dict(zip(keys, map(float, lens)))
+        for pose, lens in zip(views.world_poses, views.intrinsics)
+    ]
+    cameras.write_text(json.dumps({"frames": frames}))
+    script, words = ROOT / "examples/blender_import.py", ("--denoise", "--spp", spp, "--out", picture)
+    for name, light in maps.items():
+        for frame in range(n_views):
+            command = [python, script, asset, light, cameras, *words, "--frame", frame]
+            subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+            images[name].append(np.asarray(Image.open(picture)))
+    return relight_scores(RelitViews(images, views, spp))
+
+
+def rows_of(
+    scene: str, settings: str, minutes: float, seed: int, page: Page, work: Path, blender: Path | None
+) -> list[Row]:
     """Trains on a scene and scores the run; no rows where that failed or the data are not there."""
     if (data := data_of(scene, page.size, work)) is None:
         print(f"{scene}: no data, left out", file=sys.stderr)
@@ -154,17 +182,12 @@ def rows_of(scene: str, settings: str, minutes: float, seed: int, page: Page, wo
         scores = run / f"{asset}.json"
         if not splitnerf("evaluate", file, "--data", data, "--spp", 64, "--views", 6, "--out", scores):
             return []
-        key = (
-            scene,
-            settings,
-            f"{minutes:g}",
-            str(seed),
-            f"{page.size}",
-            os.environ.get("OMP_NUM_THREADS", "all"),
-            asset,
-        )
+        threads = os.environ.get("OMP_NUM_THREADS", "all")
+        key = dict(zip(KEYS, (scene, settings, f"{minutes:g}", str(seed), f"{page.size}", threads, asset)))
         found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
-        rows.append(dict(zip(KEYS, key)) | scored(found, commit))
+        if blender:
+            found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, work)
+        rows.append(key | scored(found, commit))
     if page.pictures:
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
         splitnerf("evaluate", run, "--data", data, "--spp", 64, "--views", 1, "--sheet", sheet)
@@ -194,7 +217,7 @@ def read_rows(path: Path) -> list[Row]:
         return []
     with open(path, newline="") as file:
         rows = csv.DictReader(line for line in file if not line.startswith("#"))
-        return [{"settings": "cpu"} | row for row in rows]
+        return [dict.fromkeys(COLUMNS, "") | {"settings": "cpu"} | row for row in rows]
 
 
 def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
@@ -227,6 +250,12 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         temporary.write_text("\n".join(lines))
 
 
+def place(row: Row, page: Page) -> tuple:
+    """By which the rows of a page are sorted."""
+    at = page.scenes.index(row["scene"]) if row["scene"] in page.scenes else len(page.scenes)
+    return at, float(row["minutes"]), row["seed"], row["asset"] == "refined"
+
+
 def cell(row: Row, column: str) -> str:
     """The text of a row's column."""
     return "all steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
@@ -237,7 +266,7 @@ def means(rows: list[Row]) -> list[str]:
     lines = []
     for minutes in sorted({row["minutes"] for row in rows}, key=float):
         chosen = [row for row in rows if row["minutes"] == minutes and row["asset"] == "refined"]
-        values = {column: [float(row[column]) for row in chosen if row[column]] for column in list(SCORES)[:3]}
+        values = {column: [float(row[column]) for row in chosen if row[column]] for column in list(SCORES)[:4]}
         text = ", ".join(f"{column[:-4]} {sum(v) / len(v):.1f} dB" for column, v in values.items() if v)
         if chosen:
             lines.append(f"Mean of {len(chosen)} runs of {minutes} minutes: {text}.")
@@ -280,6 +309,7 @@ def main() -> int:
     parser.add_argument("--again", action="store_true", help="make rows anew that are there")
     parser.add_argument("--list", action="store_true", help="say what is missing, and run nothing")
     parser.add_argument("--out", type=Path, default=ROOT / "docs/benchmarks", help="default: docs/benchmarks")
+    parser.add_argument("--blender", type=Path, metavar="PYTHON", help="relight by Blender too; needs bpy==5.0.1 there")
     args = parser.parse_args()
     if unknown := [name for name in args.pages if name not in PAGES]:
         parser.error(f"unknown page {unknown[0]}; there are {', '.join(PAGES)}")
@@ -297,19 +327,12 @@ def main() -> int:
                     if args.list:
                         print(f"{name}: {scene}, {settings}, {minutes:g} minutes, seed {seed}")
                         continue
-                    found = rows_of(scene, settings, minutes, seed, page, args.work)
+                    found = rows_of(scene, settings, minutes, seed, page, args.work, args.blender)
                     failed |= not found
                     if found:
-                        rows = [row for row in rows if tuple(row[k] for k in KEYS[:4]) != key] + found
-                        order = {s: i for i, s in enumerate(page.scenes)}
-                        rows.sort(
-                            key=lambda r: (
-                                order.get(r["scene"], 99),
-                                float(r["minutes"]),
-                                r["seed"],
-                                r["asset"] == "refined",
-                            )
-                        )
+                        now = read_rows(args.out / f"{name}.csv")  # a second process may have added rows
+                        rows = [row for row in now if tuple(row[k] for k in KEYS[:4]) != key] + found
+                        rows.sort(key=lambda row: place(row, page))
                         write_page(args.out, name, rows, args.work)
     print(f"{total:g} minutes of training" + (" are missing" if args.list else ""))
     return int(failed)

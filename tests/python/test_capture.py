@@ -214,7 +214,12 @@ def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
     Image.new("L", (8, 6)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match=r"a.png: may be the mask of a.jpg or of a.png; call it a.png.png"):
         mask_files(photos, tmp_path)
-    Image.new("L", (8, 6)).save(tmp_path / "a.png.png")
+    with pytest.raises(InputError, match="every mask is black; give masks that are white on the object"):
+        mask_files(photos[1:], tmp_path)
+    Image.new("RGB", (8, 6), "red").save(tmp_path / "a.png.png")
+    with pytest.raises(InputError, match="a.png.png: is coloured"):  # before COLMAP has run for minutes
+        mask_files(photos, tmp_path)
+    Image.new("L", (8, 6), 255).save(tmp_path / "a.png.png")
     assert [path.name for path in mask_files(photos, tmp_path).values()] == ["a.png", "a.png.png"]
     Image.new("L", (8, 6)).save(tmp_path / "a.bmp")
     with pytest.raises(InputError, match="a.png: may be a mask of the same photo as a.bmp; delete one of them"):

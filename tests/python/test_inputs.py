@@ -73,6 +73,9 @@ FORMS = {
     "opaque": rgba(255 * DISC, np.full_like(DISC, 255, np.uint8)),
     "palette": palette(DISC, (0, 0, 0), (128, 0, 0)),
     "palette, white first": palette(~DISC, (255, 255, 255), (0, 0, 0)),
+    "palette, red first": palette(~DISC, (128, 0, 0), (0, 0, 0)),
+    "palette, white on red": palette(~DISC, (255, 255, 255), (128, 0, 0)),
+    "alpha, half": rgba(np.full_like(DISC, 255, np.uint8), 128 * DISC),
     "colour, of two": png(np.repeat(255 * DISC[..., None].astype(np.uint8), 3, 2)),
     "bits": png(255 * DISC.astype(np.uint8)).convert("1"),
 }
@@ -100,6 +103,7 @@ def test_a_soft_mask_stays_as_it_is(tmp_path):
     ("image", "message"),
     [
         (png(np.uint8([[0, 1], [2, 1]])), "holds the labels 0, 1, 2"),
+        (png(np.kron(np.uint8([[0, 100, 200]]), np.ones((5, 5), np.uint8))), "holds the labels 0, 100, 200"),
         (png(np.uint8([[[255, 0, 0], [0, 0, 0]]])), "is coloured, which no mask is"),
         (palette(np.uint8([[0, 1, 2]]), (0, 0, 0), (128, 0, 0), (0, 128, 0)), "holds the labels 0, 1, 2"),
     ],
@@ -126,6 +130,22 @@ def test_channels_are_found_by_their_names(tmp_path, capsys, names):
         assert read_radiance(tmp_path / "x.exr")[0, 0] == pytest.approx(expected[:3])
 
 
+def test_the_part_with_colours_is_the_picture(tmp_path, capsys):
+    depth, colours = oiio.ImageSpec(5, 4, 1, "float"), oiio.ImageSpec(5, 4, 3, "float")
+    depth.channelnames, parts = ("Z",), ((depth, np.full((4, 5, 1), 7)), (colours, np.full((4, 5, 3), 0.25)))
+    for i, (spec, _) in enumerate(parts):
+        spec.attribute("name", f"part {i}")
+    sink = oiio.ImageOutput.create("x.exr")
+    assert sink.open(str(tmp_path / "x.exr"), (depth, colours))
+    for i, (spec, pixels) in enumerate(parts):
+        assert (i == 0 or sink.open(str(tmp_path / "x.exr"), spec, "AppendSubimage")) and sink.write_image(
+            np.float32(pixels)
+        )
+    sink.close()
+    assert read_header(tmp_path / "x.exr").channels == 3 and (read_image(tmp_path / "x.exr") == 0.25).all()
+    assert "of images with several parts one is used (x.exr: part 2)" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("left", "top"), [(2, 1), (-1, -2), (6, 4), (9, 9), (-5, 0)])
 def test_a_part_of_an_image_lies_where_its_window_says(tmp_path, left, top):
     part, whole = np.random.default_rng(0).random((4, 5, 3), np.float32), np.zeros((6, 8, 3), np.float32)
@@ -137,7 +157,7 @@ def test_a_part_of_an_image_lies_where_its_window_says(tmp_path, left, top):
     assert np.array_equal(read_image(tmp_path / "x.exr"), whole) and read_header(tmp_path / "x.exr")[:2] == (6, 8)
 
 
-def wide_profile() -> bytes:
+def wide_profile(name: str = "wide") -> bytes:
     """An ICC profile with sRGB's curve, whose red is that of Display P3 (tag values: CSS Color 4, adapted to D50)."""
     srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
     columns = {b"rXYZ": (0.5151, 0.2412, -0.0011), b"gXYZ": (0.2920, 0.6922, 0.0419), b"bXYZ": (0.1571, 0.0666, 0.7841)}
@@ -147,7 +167,7 @@ def wide_profile() -> bytes:
             srgb[offset + 8 : offset + 20] = struct.pack(">3i", *(round(65536 * x) for x in columns[tag]))
         if tag == b"desc":
             srgb[offset : offset + size] = srgb[offset : offset + size].replace(
-                "sRGB".encode("utf-16-be"), "wide".encode("utf-16-be")
+                "sRGB".encode("utf-16-be"), name.encode("utf-16-be")
             )
     return bytes(srgb)
 
@@ -158,10 +178,10 @@ FROM_P3 = np.array(
 )
 
 
-@pytest.mark.parametrize("suffix", [".png", ".jpg"])
-def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix):
+@pytest.mark.parametrize(("suffix", "name"), [(".png", "wide"), (".jpg", "wide"), (".png", "sRGB")])
+def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix, name):
     photo = np.full((16, 16, 3), (180, 130, 90), np.uint8)
-    Image.fromarray(photo).save(tmp_path / f"x{suffix}", icc_profile=wide_profile(), quality=100, subsampling=0)
+    Image.fromarray(photo).save(tmp_path / f"x{suffix}", icc_profile=wide_profile(name), quality=100, subsampling=0)
     expected = 255 * linear_to_srgb((FROM_P3 @ srgb_to_linear(np.float32([180, 130, 90]) / 255)).astype(np.float32))
     assert read_colours(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(expected, abs=2) and abs(expected[0] - 180) > 8
     assert "are converted to sRGB" in capsys.readouterr().err
@@ -214,6 +234,23 @@ def test_an_orientation_is_said(tmp_path, capsys):
     png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
     read_colours(tmp_path / "x.jpg")
     assert "state an EXIF orientation; their pixels are used as they are stored (x.jpg: 3)" in capsys.readouterr().err
+
+
+def test_another_colour_space_and_an_alpha_are_said(tmp_path, capsys):
+    """As cameras that are set to Adobe RGB say it; of cut-outs."""
+    exif = Image.Exif()
+    exif.get_ifd(34665)[40961] = 65535
+    png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
+    (tmp_path / "x.png").write_bytes(with_chunk(png(np.zeros((4, 4, 3), np.uint8)), b"cICP", bytes((12, 13, 0, 1))))
+    for file, read in (("x.jpg", read_colours), ("x.jpg", read_upright), ("x.png", read_colours)):
+        errors._said.clear()
+        read(tmp_path / file)
+        assert (
+            "state that their colours are not sRGB (Adobe RGB perhaps), and have no profile" in capsys.readouterr().err
+        )
+    png(np.zeros((4, 4, 4), np.uint8)).save(tmp_path / "y.png")
+    read_upright(tmp_path / "y.png")
+    assert "the alpha of photos is not used; give --masks if it is the object's (y.png)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("exposures", [(), (2.0,), (4.0, 0.5)])
@@ -291,6 +328,36 @@ def test_what_any_list_holds_out_is_held_out(tmp_path, lists, train, test):
         assert {names[name] for name in load_dataset(tmp_path, "test").frame_names} == test
 
 
+def test_images_of_other_files_and_names_without_a_frame_are_said(tmp_path, capsys):
+    """transforms.json has all photos, and another file those for testing; a list has a name of its own."""
+    make_blender(tmp_path, train=6, test=1)
+    content = json.loads((tmp_path / "transforms_train.json").read_text())
+    (tmp_path / "transforms_train.json").rename(tmp_path / "transforms.json")
+    (tmp_path / "transforms_test.json").write_text(json.dumps(content | {"frames": content["frames"][:2]}))
+    assert load_dataset(tmp_path).frame_names == ["r_2", "r_3", "r_4", "r_5"]
+    assert "images of transforms.json that a file holds out for testing are not trained on" in capsys.readouterr().err
+    (tmp_path / "transforms_test.json").write_text(json.dumps(content))
+    assert len(load_dataset(tmp_path).frame_names) == 6
+    assert "the scores of test views are those of photos trained on" in capsys.readouterr().err
+    (tmp_path / "transforms_test.json").unlink()
+    lists = {"test_filenames": ["train\\r_1.png", "train/r_9.png"]}
+    (tmp_path / "transforms.json").write_text(json.dumps(content | lists))
+    assert "r_1" not in load_dataset(tmp_path).frame_names
+    assert "lists of the splits name 1 images that no frame has (train/r_9)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("damage", "said"), [("none", False), ("inverted", True), ("lens", True)])
+def test_masks_that_do_not_fit_the_poses_are_said(tmp_path, capsys, damage, said):
+    data = make_blender(tmp_path)
+    for path in data.glob("train/*.png") if damage == "inverted" else ():
+        write_image(path, 1 - read_image(path))
+    if damage == "lens":
+        edit(data, lambda meta: meta.update(fl_x=50, cx=8, cy=24), "transforms_train.json")
+    load_dataset(data)
+    assert ("masks and poses fit badly" in (err := capsys.readouterr().err)) == said
+    assert ("principal points lie far from the middle" in err) == (damage == "lens")
+
+
 def test_rounded_poses_become_rotations(capsys):
     rotation = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     pose = np.eye(4)
@@ -307,7 +374,12 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
     (tmp_path / "a").mkdir()
     for name in ("a/u\u0308ber.png", "a/b.PNG", "a/c.JPG"):
         (tmp_path / name).write_bytes(b"")
-    for listed, expected in (("a\\\u00fcber.png", "a/u\u0308ber.png"), ("a/b", "a/b.PNG"), (".\\a\\c", "a/c.JPG")):
+    for listed, expected in (
+        ("a\\\u00fcber.png", "a/u\u0308ber.png"),
+        ("a/b", "a/b.PNG"),
+        (".\\a\\c", "a/c.JPG"),
+        ("a/c.jpg", "a/c.JPG"),
+    ):
         assert listed_image(tmp_path, listed, Path("t")).samefile(tmp_path / expected)
     assert listed_file(tmp_path, "a\\b.PNG", Path("t")).samefile(tmp_path / "a/b.PNG")
 

@@ -7,11 +7,13 @@ import pytest
 import trimesh
 from blender_data import SIZE, edit, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, write_colmap, write_neus, write_transforms
+from splitnerf import errors
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import write_image
+from splitnerf.data.layouts import transforms
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -27,6 +29,12 @@ LAYOUTS = {
     "COLMAP of nerfstudio": lambda root: write_colmap(root, binary=True, place="colmap/sparse/0"),
     "COLMAP, undistorted": lambda root: write_colmap(root, binary=False, place="sparse"),
 }
+
+
+@pytest.fixture(autouse=True)
+def unsaid(monkeypatch):
+    """No note was written yet."""
+    monkeypatch.setattr(errors, "_said", set())
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -242,6 +250,58 @@ def test_damaged_files_are_refused_or_read(tmp_path, kind):
             refused += 1
             assert len(str(error).splitlines()) == 1 and str(tmp_path) in str(error)
     assert refused > 30
+
+
+WIDE = {"fl_x": 100, "fl_y": 80, "cx": 60, "cy": 30, "w": 120, "h": 60}
+FRAMES = [  # the file, the frame, and fx, fy, cx, cy of a photo of the frame's own size; None where it is refused
+    (WIDE, {}, (120, 60), (100, 80, 60, 30)),
+    (WIDE, {"fl_x": 50}, (120, 60), (50, 40, 60, 30)),
+    ({"fl_y": 80}, {"fl_x": 50}, (120, 60), (50, 80, 60, 30)),
+    ({"fl_x": 80}, {"fl_x": 50}, (120, 60), (50, 50, 60, 30)),
+    (WIDE, {"w": 240, "h": 120}, (240, 120), (200, 160, 120, 60)),
+    (WIDE, {"w": 240, "h": 120, "fl_x": 150}, (240, 120), (150, 120, 120, 60)),
+    (WIDE, {"w": 60, "h": 120}, (60, 120), None),
+    (WIDE, {"w": 60, "h": 120, "cx": 30, "cy": 60}, (60, 120), (100, 80, 30, 60)),
+    ({"camera_angle_x": 1.0, "w": 120, "h": 60}, {"w": 60, "h": 120}, (60, 120), None),
+]
+
+
+@pytest.mark.parametrize(("file", "frame", "size", "expected"), FRAMES)
+def test_the_numbers_of_a_file_are_brought_to_the_size_of_a_frame(tmp_path, file, frame, size, expected):
+    write_image(tmp_path / "a.png", np.zeros(size[::-1], np.float32))
+    frames = [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()} | frame]
+    (tmp_path / "transforms.json").write_text(json.dumps(file | {"frames": frames}))
+    if expected is None:
+        with pytest.raises(
+            InputError, match=r"frame 0 \(a.png\): is 60x120 and .* is of 120x60; give the frame its own"
+        ):
+            transforms.read(tmp_path, None)
+    else:
+        (read,) = transforms.read(tmp_path, None)
+        assert lens_intrinsics(read.lens, size[::-1]) == pytest.approx(expected)
+
+
+def test_masks_are_paired_by_names_and_numbers(tmp_path, capsys):
+    neus, model = write_neus(tmp_path / "neus"), write_colmap(tmp_path / "model", binary=False)
+    (neus / "image/._v00.png").write_bytes(b"a Mac's")
+    first, second = sorted((neus / "mask").iterdir())[:2]
+    first.rename(neus / "mask/zz.png")
+    with pytest.raises(InputError, match="mask: has no mask of v00.png; give each image one of its name or number"):
+        read_frames(neus, "train")
+    (neus / "mask/zz.png").rename(neus / "mask/0.png")
+    frames, _ = read_frames(neus, "train", Reading("all"))
+    assert [frame.mask_path.name for frame in frames[:2]] == ["0.png", second.name] and not capsys.readouterr().err
+    for i, path in enumerate(sorted((neus / "image").glob("v*"))):
+        path.rename(neus / f"image/{i}.png")
+    read_frames(neus, "train")
+    assert "in the alphabet's order, which is not that of their numbers" in capsys.readouterr().err
+    (model / "masks").mkdir()
+    read_frames(model, "train")
+    assert "masks: no image has a mask there (v00.png.png would be one)" in capsys.readouterr().err
+    lines = (model / "sparse/0/images.txt").read_text().splitlines()
+    (model / "sparse/0/images.txt").write_text("\n".join(lines[:1] + lines[1::2]))
+    with pytest.raises(InputError, match="images.txt: is damaged or no file of COLMAP .* has no line of points"):
+        read_frames(model, "train")
 
 
 # ---- what a run holds out ----

@@ -33,6 +33,11 @@ HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
 STORED = {"uint8": 8, "uint16": 16}  # bits of the values of files that are read as they are
+SRGB_CODES = (1, 13)  # of primaries and curve, as a PNG's cICP chunk says them
+UNCALIBRATED = 0xFFFF  # of EXIF: another colour space than sRGB
+RAMPS = np.array(
+    [[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.uint8
+)  # edges of a cube
 REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # x, y of red, green, blue and white
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
@@ -70,9 +75,17 @@ def read_colours(path: str | os.PathLike) -> np.ndarray:
         profile = bytes(np.asarray(stated["ICCProfile"], np.uint8))
         pixels[..., :n_colours] = from_profile(pixels[..., :n_colours], profile, path)
     else:
+        if stated.get("Exif:ColorSpace") == UNCALIBRATED or tuple(stated.get("CICP", SRGB_CODES))[:2] != SRGB_CODES:
+            note_other_space(path)
         gamma = _stated_gamma(str(stated.get("oiio:ColorSpace", "")))
         pixels[..., :n_colours] = from_gamma(pixels[..., :n_colours], gamma, path)
     return pixels
+
+
+def note_other_space(path: Path) -> None:
+    """Notes that a photo says that it is not sRGB, and has no profile that says what it is."""
+    what = "photos state that their colours are not sRGB (Adobe RGB perhaps), and have no profile"
+    note_once(f"{path.parent}: {what}; their values count as sRGB, convert them", path.name)
 
 
 def from_gamma(codes: np.ndarray, gamma: float, path: Path) -> np.ndarray:
@@ -91,13 +104,17 @@ def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
     try:
         source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
         name = ImageCms.getProfileDescription(source).strip()
-        if "srgb" in name.lower() or "iec61966" in name.lower():
+        if colours.shape[2] != 3 and re.search("srgb|iec61966", name.lower()):
             return colours
         if colours.shape[2] != 3 or colours.dtype != np.uint8:
             raise ValueError("only photos of 8 bits and three channels are converted")
         image, target = Image.fromarray(np.ascontiguousarray(colours)), ImageCms.createProfile("sRGB")
         intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
-        converted = ImageCms.profileToProfile(image, source, target, intent, outputMode="RGB")
+        change = ImageCms.buildTransform(source, target, "RGB", "RGB", intent)
+        ramps = Image.fromarray(np.arange(256, dtype=np.uint8)[:, None, None] * RAMPS)
+        if np.abs(np.subtract(ImageCms.applyTransform(ramps, change), ramps, dtype=int)).max() <= 2:
+            return colours  # the profile is sRGB's, whatever its name
+        converted = ImageCms.applyTransform(image, change)
     except (ImageCms.PyCMSError, OSError, ValueError) as error:
         note_once(
             f"{path.parent}: the colour profile of photos is not used, as {error}; convert them to sRGB", path.name
@@ -274,7 +291,7 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
     """[H, W, C], float32 or, where that is asked for and they are bytes or words, the values as they are stored."""
     with _opened(path, name) as (source, spec):
         kind = str(spec.format) if as_stored and str(spec.format) in STORED else "float"
-        pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
+        pixels = source.read_image(source.current_subimage(), 0, 0, spec.nchannels, kind)
         if pixels is None or source.has_error:
             raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
         pixels, kept = np.asarray(pixels).reshape(spec.height, spec.width, -1), _channels(spec)
@@ -301,14 +318,18 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
 
 
 def _channels(spec: oiio.ImageSpec) -> list[int]:
-    """The channels that make an image: R, G, B and A, or Y and A, by their names, of the first layer that has them; all where
-    the names are others."""
+    """The channels that make an image, see :func:`_named_channels`; all where the names are others."""
+    return _named_channels(spec) or list(range(spec.nchannels))
+
+
+def _named_channels(spec: oiio.ImageSpec) -> list[int]:
+    """The channels R, G, B and A, or Y and A, by their names, of the first layer that has them; none where the names are others."""
     names = [name.lower() for name in spec.channelnames]
     layers = ["", *dict.fromkeys(name[: name.rfind(".") + 1] for name in names)]
     for layer, colours in product(layers, ("rgb", "y")):
         if all(layer + colour in names for colour in colours):
             return [names.index(layer + name) for name in f"{colours}a" if layer + name in names]
-    return list(range(spec.nchannels))
+    return []
 
 
 def _window(source: oiio.ImageInput, spec: oiio.ImageSpec) -> tuple[int, int, int, int]:
@@ -364,7 +385,7 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
     if source is None:
         raise InputError(f"{name}: cannot be read as an image ({_reason(oiio)}); replace it")
     try:
-        spec = source.spec()
+        spec = _first_picture(source, path) if source.format_name() == "openexr" else source.spec()
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
         size = f"{spec.width}x{spec.height}"
         if min(spec.width, spec.height) < 1 or spec.depth > 1 or n_values > VALUES_PER_BYTE * path.stat().st_size:
@@ -376,6 +397,19 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         yield source, spec
     finally:
         source.close()
+
+
+def _first_picture(source: oiio.ImageInput, path: Path) -> oiio.ImageSpec:
+    """Goes to the first part of an EXR file that holds colours, as the first may be a depth."""
+    parts = [source.spec()]
+    while source.seek_subimage(len(parts), 0):
+        parts.append(source.spec())
+    source.geterror()  # there is no further part
+    chosen = next((i for i, part in enumerate(parts) if _named_channels(part)), 0)
+    if len(parts) > 1:
+        note_once(f"{path.parent}: of images with several parts one is used", f"{path.name}: part {chosen + 1}")
+        source.seek_subimage(chosen, 0)
+    return parts[chosen]
 
 
 def _reason(source) -> str:

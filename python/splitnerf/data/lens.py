@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 
 SMALLEST, LARGEST = 1e-6, 1e9  # bounds of a pinhole's numbers
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4"), ("p1", "p2")
@@ -123,6 +123,8 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
     if fisheye and any(tangential):
         raise InputError(f"{where}: a fisheye with 'p1' or 'p2' is not read; undistort the photos")
     bends = fisheye or any(radial) or any(tangential)
+    if bends and model.endswith("PINHOLE"):
+        note_once(f"{where}: has coefficients of distortion, which a {model} lacks; they are used")
     return numbers, Distortion(radial, tangential, fisheye) if bends else None
 
 
@@ -133,7 +135,7 @@ def check_shape(lens: dict, size: tuple[int, int], path: object) -> None:
     w, h = lens.get("w", width), lens.get("h", height)
     if abs(width * h - height * w) > max(w, h):
         raise InputError(
-            f"{path}: is {width}x{height}, but its lens is stated for {w:g}x{h:g}; turn the image, or repair 'w' and 'h'"
+            f"{path}: is {width}x{height}, but its lens is stated for {w:g}x{h:g}; turn the image (an EXIF orientation is not used), or repair 'w' and 'h'"
         )
 
 

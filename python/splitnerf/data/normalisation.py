@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from splitnerf.errors import note_once
+
 FITS_RADIUS = (0.4, 1.4)
 TARGET_RADIUS = 1.0
 COARSE, FINE = 32, 48
 IN_VIEW = 0.8  # radius of what all cameras look at, as a share of what the narrower side of a photo shows
+POOR = 0.9  # median share of the masks that the hull covers, below which masks and poses are not of one object
 SAME_PLACE = 1e-9  # distance of cameras, as a share of that from the origin
 PARALLEL = 1e-4  # mean squared sine below which optical axes do not say where they meet
 
@@ -38,6 +41,7 @@ def estimate_box(
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
     Where the hull's bounding sphere about the origin has a radius in (0.4, 1.4] the data's frame is kept: the identity.
+    Notes where the hull covers little of the masks, as with a wrong lens or masks that are inverted.
 
     Args:
         silhouettes: n arrays [H, W] bool, true on the object, each of its own size.
@@ -65,6 +69,9 @@ def estimate_box(
         points = grid[alive]
         low, high = points.min(axis=0), points.max(axis=0)
         centre, half = (low + high) / 2, (high - low) / 2 + cell
+    if (share := np.median([view.covered(points, cell) for view in views])) < POOR:
+        found = f"what all masks hold covers {share:.0%} of them"
+        note_once(f"masks and poses fit badly: {found}; check masks, poses and lens, `splitnerf inspect` shows them")
     if FITS_RADIUS[0] < np.linalg.norm(points, axis=1).max() <= FITS_RADIUS[1]:
         return np.eye(4)
     return _similarity(centre, np.linalg.norm(points - centre, axis=1).max() + cell / 2)
@@ -171,6 +178,21 @@ class MaskView:
         A point stands for its cell: it counts as foreground where any mask pixel within the projected half cell is one,
         counted with the summed-area table.
         """
+        visible, (x0, x1, y0, y1) = self._shown(points, cell)
+        table = self.table
+        return visible, table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0
+
+    def covered(self, points: np.ndarray, cell: float) -> float:
+        """The share of the mask that cells around points [m, 3] cover; 1 where the mask is empty."""
+        visible, (x0, x1, y0, y1) = self._shown(points, cell)
+        marks = np.zeros(self.table.shape, np.int32)
+        for y, x, sign in ((y0, x0, 1), (y1, x1, 1), (y0, x1, -1), (y1, x0, -1)):
+            np.add.at(marks, (y[visible], x[visible]), sign)
+        mask = np.diff(np.diff(self.table, axis=0), axis=1) > 0
+        return float((marks.cumsum(0).cumsum(1)[:-1, :-1] > 0)[mask].mean()) if mask.any() else 1.0
+
+    def _shown(self, points: np.ndarray, cell: float) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Whether the view shows points [m, 3], and what pixels their cells cover: first and last column + 1, then rows."""
         height, width = self.table.shape[0] - 1, self.table.shape[1] - 1
         fx, fy, cx, cy = self.intrinsics
         local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
@@ -183,8 +205,7 @@ class MaskView:
         reach = 0.5 * cell * max(fx, fy) / depth
         x0, x1 = np.clip(x - reach, 0, width - 1).astype(int), np.clip(x + reach, 0, width - 1).astype(int) + 1
         y0, y1 = np.clip(y - reach, 0, height - 1).astype(int), np.clip(y + reach, 0, height - 1).astype(int) + 1
-        table = self.table
-        return visible, table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0
+        return visible, (x0, x1, y0, y1)
 
 
 def _inside(points: np.ndarray, cell: float, views: list[MaskView]) -> tuple[np.ndarray, int]:

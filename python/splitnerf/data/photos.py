@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from PIL import Image
+from scipy.ndimage import maximum_filter, minimum_filter
 from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import NEGATIVE_SHARE
@@ -50,7 +51,8 @@ PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
 
-MOST_LABELS = 32  # values up to which a mask of more than two of them is taken for one of labels
+MOST_LABELS = 32  # number and size of values up to which a mask of more than two of them may be one of labels
+LABELLED = 0.01  # share of a mask in areas of values between the least and the largest
 THREADS = 8
 WORK, WORK_BENT = 24, 110  # bytes a pixel of the file, while a photo is read; where it is turned into floats
 
@@ -183,14 +185,25 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bo
 
 
 def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> None:
-    """Raises InputError where one angle or principal point is stated for photos of two shapes: only a focal length in pixels
-    can be that of a camera that was turned."""
+    """Raises InputError where one lens is stated for photos of several sizes, and not for which: a focal length in pixels may be
+    that of a camera that was turned, or of crops, an angle or a principal point of photos of one shape. Notes where a principal
+    point lies far from the middle, as of a lens that is stated for another size."""
     first: dict[str, int] = {}
     for i, (frame, (height, width)) in enumerate(zip(frames, sizes)):
-        if "w" in frame.lens or not frame.lens.keys() & {"camera_angle_x", "cx", "cy"}:
+        x, y = lens_intrinsics(frame.lens, (height, width))[2:]
+        if not all(1 / 3 < share < 2 / 3 for share in (x / width, y / height)):
+            what = f"({x:.0f}, {y:.0f}) in {width}x{height} pixels"
+            note_once(
+                "principal points lie far from the middle of their photos; check the lens if they are no crops",
+                f"{frame.image_path.name}: {what}",
+            )
+        if "w" in frame.lens:
             continue
         j = first.setdefault(str(sorted(frame.lens.items())), i)
-        if abs(width * sizes[j][0] - height * sizes[j][1]) >= max(*sizes[j], height, width):
+        same_shape = abs(width * sizes[j][0] - height * sizes[j][1]) < max(*sizes[j], height, width)
+        in_pixels = frame.lens.keys() & {"fl_x", "fl_y", "cx", "cy"}
+        in_shape = frame.lens.keys() & {"camera_angle_x", "cx", "cy"}
+        if (height, width) != tuple(sizes[j]) and (in_pixels if same_shape else in_shape):
             other = f"{frames[j].image_path.name} is {sizes[j][1]}x{sizes[j][0]}"
             raise InputError(
                 f"{frame.image_path}: is {width}x{height}, {other}, and one lens is stated for both; give each frame its own "
@@ -255,7 +268,7 @@ def read_mask(path: Path) -> np.ndarray:
     """A mask, white where it is set.
 
     Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries in colour. Of two
-    values the larger one is white and the other one black, whatever they are.
+    values the larger one is white and the other one black, whatever they are; of two entries that which is black or not white is black.
 
     Returns:
         [H, W, 1] uint8, uint16, or float32 in [0, 1].
@@ -268,8 +281,8 @@ def read_mask(path: Path) -> np.ndarray:
         raise InputError(f"{path}: has NaN, infinite or negative pixels or such above 1; save it as 8 or 16 bit PNG")
     alpha = pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
     if alpha is not None and alpha.min() != alpha.max():
-        return alpha
-    if (entries := _palette_entries(path)) is not None:
+        mask = alpha
+    elif (entries := _palette_entries(path)) is not None:
         mask = entries[..., None]
     elif pixels.shape[2] >= 3 and (pixels[..., :3] != pixels[..., :1]).any():
         raise InputError(f"{path}: is coloured, which no mask is; save the object as white on black")
@@ -280,7 +293,9 @@ def read_mask(path: Path) -> np.ndarray:
     values, most = np.flatnonzero(np.bincount(mask.ravel())), np.iinfo(mask.dtype).max
     if len(values) == 2:
         return np.where(mask == values[1], most, 0).astype(mask.dtype)
-    if len(values) > 2 and values[-1] < MOST_LABELS:
+    flat = maximum_filter(mask, (3, 3, 1)) == minimum_filter(mask, (3, 3, 1))
+    between = flat & (mask > values[0]) & (mask < values[-1])  # areas, where the edge of a shape has lines
+    if 2 < len(values) <= MOST_LABELS and (values[-1] < MOST_LABELS or between.mean() > LABELLED):
         raise InputError(
             f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black"
         )
@@ -295,7 +310,9 @@ def _palette_entries(path: Path) -> np.ndarray | None:
             return None
     with Image.open(path) as image:
         entries, colours = np.asarray(image), np.asarray(image.getpalette("RGB")).reshape(-1, 3)
-        used = colours[np.flatnonzero(np.bincount(entries.ravel()))]
+        used = colours[values := np.flatnonzero(np.bincount(entries.ravel()))]
+        if len(used) == 2 and ((black := ~used.any(axis=1)) | (white := (used == 255).all(axis=1))).any():
+            return (entries == values[np.argmax(~black if black.any() else white)]).astype(np.uint8)
         return None if (used == used[:, :1]).all() else entries
 
 

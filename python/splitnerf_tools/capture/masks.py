@@ -63,7 +63,7 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
     """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
 
     Raises:
-        InputError: A photo has no mask, one of another size, or one that may be another's, too.
+        InputError: A photo has no mask, one of another size, one that may be another's, too, or one that is no mask, or all are black.
     """
     found, stems = {}, {}
     for path in sorted(folder.iterdir()):
@@ -82,6 +82,8 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
         if (width, height) != (photo.width, photo.height):
             raise InputError(f"{path}: is {width}x{height}, its photo {photo.width}x{photo.height}; make them equal")
         found[photo.name] = path
+    if not any([read_mask(path).any() for path in found.values()]):  # each is read, and refused if it is no mask
+        raise InputError(f"{folder}: every mask is black; give masks that are white on the object")
     return found
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PIL import ExifTags, Image
-from splitnerf.data.images import from_gamma, from_profile
+from splitnerf.data.images import UNCALIBRATED, from_gamma, from_profile, note_other_space
 from splitnerf.errors import InputError, note_once, plain
 from splitnerf.files import atomic_path
 
@@ -98,7 +98,15 @@ def read_upright(path: Path) -> np.ndarray:
         except (rawpy.LibRawError, OSError) as error:
             raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
-        turn, profile = TURNS.get(_exif(image, path).get(ExifTags.Base.Orientation)), image.info.get("icc_profile")
+        exif, profile = _exif(image, path), image.info.get("icc_profile")
+        turn, space = (
+            TURNS.get(exif.get(ExifTags.Base.Orientation)),
+            exif.get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace),
+        )
+        if image.has_transparency_data:
+            note_once(f"{path.parent}: the alpha of photos is not used; give --masks if it is the object's", path.name)
+        if space == UNCALIBRATED and not profile:
+            note_other_space(path)
         stored = image.info.get("gamma") or math.inf  # the exponent of what a PNG stores
         upright = image if turn is None else image.transpose(turn)
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip

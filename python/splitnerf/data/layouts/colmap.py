@@ -65,6 +65,14 @@ def read(root: Path, split: None = None) -> list[Frame]:
         frames.append(Frame(os.path.splitext(name)[0], image, pose, *lenses[camera], mask))
     if not frames:
         raise InputError(f"{source}: has no registered image; give another model")
+    used = [frame.mask_path for frame in frames if frame.mask_path is not None]
+    if len({*used}) < len(used):
+        double = next(path for path in used if used.count(path) > 1)
+        raise InputError(
+            f"{double}: may be the mask of several images; call masks by whole names, as {frames[0].image_path.name}.png"
+        )
+    if not used and (root / MASKS).is_dir():
+        note_once(f"{root / MASKS}: no image has a mask there", f"{frames[0].image_path.name}.png would be one")
     return frames
 
 
@@ -112,7 +120,8 @@ def _images(file: BinaryIO) -> Iterator[Image]:
         lines = _lines(file)
         for line in filter(str.strip, lines):
             _, *motion, camera, name = line.split(maxsplit=9)
-            next(lines, None)
+            if len(next(lines, "").split()) % 3:  # x, y and the number of each point
+                raise ValueError(f"image {name.strip()!r} has no line of points, which may be empty")
             yield name.strip(), int(camera), tuple(map(float, motion))
         return
     for _ in range(*_take(file, "Q")):

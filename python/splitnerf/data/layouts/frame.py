@@ -96,12 +96,13 @@ def listed_file(folder: Path, name: str, source: Path) -> Path:
 
 
 def listed_image(folder: Path, name: str, source: Path) -> Path:
-    """The image that `source` lists relative to `folder`, perhaps without its suffix. Raises InputError where there is
-    no such regular file."""
+    """The image that `source` lists relative to `folder`, perhaps without its suffix or with one in other letters. Raises InputError
+    where there is no such regular file."""
+    stem, own = os.path.splitext(name)
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
-    for suffix in ("", *suffixes):
-        if any(is_file(folder / form) for form in forms(f"{name}{suffix}")):
-            return listed_file(folder, f"{name}{suffix}", source)
+    for candidate in (name, *(name + suffix for suffix in suffixes), stem + own.lower(), stem + own.upper()):
+        if any(is_file(folder / form) for form in forms(candidate)):
+            return listed_file(folder, candidate, source)
     raise InputError(
         f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "
         "frame"

@@ -2,7 +2,7 @@
 
     world_mat_0, world_mat_1, ...   4 x 4 float, K [R | t] above a row 0 0 0 1: from the data's world to pixels, the
                                     first pixel's centre at (0, 0), in the order of the images' names
-    image/, mask/                   PNG or JPEG, paired by the order of their names; white is the object
+    image/, mask/                   PNG or JPEG of the same names or numbers; white is the object
 
 The world is that of `world_mat`, in its own units; `scale_mat_0` ..., which say where the object is, are not needed.
 """
@@ -18,7 +18,7 @@ from scipy.linalg import rq
 from splitnerf.data.images import LDR_SUFFIXES
 from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose
 from splitnerf.data.lens import read_lens
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 
 CAMERAS, IMAGES, MASKS = "cameras_sphere.npz", "image", "mask"
 LONGEST_MATRIX = 4096  # bytes of an array in the file
@@ -36,8 +36,8 @@ def splits(root: Path) -> None:
 
 
 def read(root: Path, split: None = None) -> list[Frame]:
-    """All frames, by name. Raises InputError where a file cannot be used, or the numbers of cameras, images and masks
-    differ."""
+    """All frames, by name. Raises InputError where a file cannot be used, the numbers of cameras, images and masks differ, or an
+    image has no mask of its name."""
     matrices = read_matrices(root / CAMERAS)
     images, masks = _pictures(root / IMAGES), _pictures(root / MASKS)
     for folder, found in ((IMAGES, images), (MASKS, masks)):
@@ -45,6 +45,17 @@ def read(root: Path, split: None = None) -> list[Frame]:
             raise InputError(
                 f"{root / folder}: has {len(found)} images, {CAMERAS} has {len(matrices)} cameras; repair it"
             )
+    of_key, numbers = (
+        {_key(mask): mask for mask in masks},
+        [_key(image) for image in images if re.search(r"\d", image.stem)],
+    )
+    alone = sorted(image.name for image in images if masks and _key(image) not in of_key)
+    if alone:
+        raise InputError(f"{root / MASKS}: has no mask of {alone[0]}; give each image one of its name or number")
+    if numbers != sorted(numbers):
+        note_once(
+            f"{root / IMAGES}: images are paired with cameras in the alphabet's order, which is not that of their numbers"
+        )
     frames = []
     for i, (matrix, image) in enumerate(zip(matrices, images)):
         name = f"{root / CAMERAS}: world_mat_{i}"
@@ -56,7 +67,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
                 image,
                 checked_pose(pose, name),
                 read_lens(numbers, name)[0],
-                mask_path=masks[i] if masks else None,
+                mask_path=of_key.get(_key(image)),
                 mask_kind="object",
             )
         )
@@ -107,3 +118,8 @@ def _pictures(folder: Path) -> list[Path]:
         for path in folder.glob("*")
         if path.suffix.lower() in LDR_SUFFIXES and path.is_file() and not path.name.startswith("._")
     )
+
+
+def _key(path: Path) -> tuple:
+    """What an image and its mask share: the numbers in their names or, without any, the names."""
+    return tuple(map(int, re.findall(r"\d+", path.stem))) or (path.stem,)

@@ -23,11 +23,12 @@ Beside an image NAME.png a file dynamic_mask_NAME.png is white where the image i
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from pathlib import Path
 
 import numpy as np
 
+from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
 from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
@@ -85,7 +86,9 @@ def read(root: Path, split: str | None) -> list[Frame]:
     own = root / _own(split)
     if not own.is_file() and not (root / SINGLE).is_file():
         raise InputError(f"{root}: has neither {own.name} nor {SINGLE}; add posed images for the {split} split")
-    return _frames(own, None) if own.is_file() else _frames(root / SINGLE, split)
+    if not own.is_file():
+        return _frames(root / SINGLE, split, _of_other_files(root, split))
+    return _frames(own, split if split == "train" else None, _of_other_files(root, split))
 
 
 def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
@@ -105,8 +108,22 @@ def _has_lists(meta: dict) -> bool:
 
 
 def _listed(meta: dict, key: str) -> set[str]:
-    """The images that a list of a single file names."""
-    return {os.path.normpath(str(name)) for name in meta[key]} if isinstance(meta.get(key), list) else set()
+    """The images that a list of a file names."""
+    return {_image(name) for name in meta[key]} if isinstance(meta.get(key), list) else set()
+
+
+def _image(name: object) -> str:
+    """The image that a file lists, however its path is written and without its suffix."""
+    path, suffix = os.path.splitext(os.path.normpath(str(name).replace("\\", "/")))
+    return path if suffix.lower() in LDR_SUFFIXES + HDR_SUFFIXES else path + suffix
+
+
+def _of_other_files(root: Path, split: str) -> set[str]:
+    """The images that the files of test and validation hold, which are none of the train split's."""
+    files = [root / _own(name) for name in ("test", "val")] if split == "train" else []
+    found = [read_json(path, "frames").get("frames") for path in files if path.is_file()]
+    entries = [entry for frames in found if isinstance(frames, list) for entry in frames if isinstance(entry, dict)]
+    return {_image(entry.get("file_path")) for entry in entries}
 
 
 def _held_out(meta: dict) -> set[str]:
@@ -128,16 +145,22 @@ def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
     return lambda name: name not in others and (not chosen or name in chosen)
 
 
-def _frames(path: Path, split: str | None) -> list[Frame]:
-    """The frames of a file; of a single file those that are of the split."""
+def _frames(path: Path, split: str | None, held_out: Set[str] = frozenset()) -> list[Frame]:
+    """The frames of a file, or those of a split by its lists; without those that other files hold out, if that leaves any."""
     meta, entries = read_entries(path)
     _name_unused(meta, entries, path)
+    names = [_image(entry.get("file_path")) for entry in entries]
     chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split)
-    frames = [
-        read_frame(entry, meta, i, path)
-        for i, entry in enumerate(entries)
-        if chosen(os.path.normpath(str(entry.get("file_path"))))
-    ]
+    listed = set().union(*(_listed(meta, key) for keys in SPLITS.values() for key in keys))
+    if unknown := sorted(listed - {*names}):
+        note_once(f"{path}: lists of the splits name {len(unknown)} images that no frame has", unknown[0])
+    kept = [i for i, name in enumerate(names) if chosen(name)]
+    if held_out & {names[i] for i in kept}:
+        rest = [i for i in kept if names[i] not in held_out]
+        what = "not trained on" if rest else "all there are: the scores of test views are those of photos trained on"
+        note_once(f"{path.parent}: the images of {path.name} that a file holds out for testing are {what}")
+        kept = rest or kept
+    frames = [read_frame(entries[i], meta, i, path) for i in kept]
     if not frames:
         raise InputError(f"{path}: has no frames for the {split} split; add posed images")
     return frames
@@ -226,11 +249,40 @@ def _read_camera(
 ) -> tuple[np.ndarray, dict, Distortion | None]:
     matrix = need(entry, "transform_matrix", path, f" in frame {index}")
     pose = checked_pose(matrix, f"{path}: transform_matrix of {name}")
-    given = {key: meta.get(key) if entry.get(key) is None else entry[key] for key in (*LENS, *OTHER_LENSES)}
     for key in OTHER_LENSES:
-        value = given.pop(key)
+        value = meta.get(key) if entry.get(key) is None else entry[key]
         if any(value) if isinstance(value, list) else value:
             raise InputError(f"{path}: '{key}' is not read; undistort the photos and leave it out")
-    own = any(entry.get(key) is not None for key in FOCAL)
-    focal = {key: (entry if own else meta).get(key) for key in FOCAL}
-    return pose, *read_lens(focal | given, str(path))
+    numbers, own = _lens_numbers(entry, meta, f"{path}: {name}"), any(key in entry for key in (*FOCAL, *LENS))
+    return pose, *read_lens(numbers, f"{path}: {name}" if own or index else str(path))
+
+
+def _lens_numbers(entry: dict, meta: dict, where: str) -> dict:
+    """The numbers of a frame's lens: its own, else the file's for the frame's own size. Raises InputError where the file's are for
+    another shape."""
+    own, shared = ({key: of[key] for key in (*FOCAL, *LENS) if of.get(key) is not None} for of in (entry, meta))
+    axes, axes_of_file = ({key[-1] for key in of if key in FOCAL} for of in (own, shared))
+    if axes:  # an axis without a number of its own is as the other, unless the file says how they differ
+        dropped = {key for key in FOCAL if axes & {key[-1], *axes_of_file}}
+        ratio = [shared.get(key) for key in ("fl_x", "fl_y")]
+        shared = {key: value for key, value in shared.items() if key not in dropped}
+        if len(axes) == 1 and _are_positive(*ratio, focal := own.get(f"fl_{min(axes)}")):
+            own["fl_y" if "x" in axes else "fl_x"] = focal * (
+                ratio[1] / ratio[0] if "x" in axes else ratio[0] / ratio[1]
+            )
+    width, height, w, h = own.get("w"), own.get("h"), shared.get("w"), shared.get("h")
+    if not _are_positive(width, height, w, h) or (width, height) == (w, h):
+        return shared | own
+    taken = {key for key, value in shared.items() if key not in own and isinstance(value, (int, float))}
+    if abs(width * h - height * w) <= max(width, height, w, h):
+        factors = {"fl_x": width / w, "cx": width / w, "fl_y": height / h, "cy": height / h}
+        return shared | {key: shared[key] * factors[key] for key in taken & factors.keys()} | own
+    angles = set() if {"fl_x", "fl_y"} & (shared.keys() | own) else {"camera_angle_x", "camera_angle_y"}
+    if wrong := sorted(taken & {"cx", "cy", *angles}):
+        raise InputError(f"{where}: is {width}x{height} and {wrong[0]!r} is of {w}x{h}; give the frame its own")
+    return shared | own
+
+
+def _are_positive(*values: object) -> bool:
+    """Whether all are positive numbers."""
+    return all(isinstance(value, (int, float)) and value > 0 for value in values)
