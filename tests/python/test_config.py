@@ -45,7 +45,6 @@ PRINTED = dict(
     mesh=dict(every=0.1),
     losses=dict(colour_weight=10.0, light_weight=10.0, occlusion_weight=0.01, eikonal_weight=0.1, metal_weight=0.001),
     constants=dict(surface_width=64, materials_width=256, light_width=256, light_layers=5, occlusion_width=256)
-    | dict(levels_open_by=0.6)  # 12 levels, one each 1000 of 20,000 steps
     | dict(direction_frequencies=10, light_samples=8129, warmup_steps=500),
 )
 RELEASED = dict(
@@ -53,7 +52,8 @@ RELEASED = dict(
     sampling=dict(occupancy="average", max_rays=8192, target_samples=262144, grid_resolution=128),
     mesh=dict(resolution=512),
     constants=dict(min_step=math.sqrt(3) * 3 / 1024, light_queries=8129, learning_rate=0.01, final_learning_rate=0.1)
-    | dict(box=1.5, sphere_radius=0.5, initial_variance=0.3, initial_rays=256, occlusion_rays=64),
+    | dict(box=1.5, sphere_radius=0.5, initial_variance=0.3, initial_rays=256, occlusion_rays=64)
+    | dict(start_levels=4, levels_open_by=0.6),  # 12 levels, one each 1000 of 20,000 steps
 )
 
 

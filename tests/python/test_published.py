@@ -24,6 +24,7 @@ from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
 from splitnerf.evaluate.published import stanford_orb as orb_protocol
+from splitnerf.evaluate.published.scoring import table, table_of_lights
 from splitnerf.evaluate.published.stanford_orb import read_lit_photo
 from splitnerf.evaluate.published.views import relit_views
 from tiny_runs import command
@@ -49,6 +50,15 @@ def fits(frame: Frame, rendered: dict[str, np.ndarray]) -> float:
     photo, mask = read_lit_photo(frame)
     known = (mask > 0.99) & (photo * frame.exposure < 0.95).all(axis=-1)
     return psnr(*(image[known].clip(0, 1) ** (1 / 2.2) for image in (rendered["radiance"], photo)))
+
+
+def test_published_scores_stand_beside_those_of_their_own_protocol():
+    """The SplitNeRF paper's are of 20 views and a factor on the images, not of NeRFactor's protocol."""
+    shown = table_of_lights({"relight": {"psnr": 30.0, "ssim": 0.95, "lpips": None}, "albedo": {"psnr": 26.0}}, "ours")
+    head, ours, *published, source = shown.splitlines()
+    assert ours.split() == ["ours", "30.00", "0.950", "-", "26.00", "-", "-"] and "relit, PSNR" in head
+    assert published[-1].split()[:3] == ["SplitNeRF", "27.31", "0.941"] and "20 test views" in source
+    assert "SplitNeRF" not in table("nerfactor", {"psnr": 30.0}, "ours")
 
 
 def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
@@ -186,8 +196,12 @@ def complete(layout: str, scene) -> None:
             np.save(truth / f"surface_normal/{i:04d}.npy", normals)
         (truth / "mesh_blender").mkdir()
         trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(truth / "mesh_blender/mesh.obj")
-    if layout == "nerfactor":  # of its 200 test views two that count, and a validation view
-        shutil.copytree(root / "test_000", root / "val_000")
+    if (
+        layout == "nerfactor"
+    ):  # of its 200 test views two that count, and two validation views, of which one has the factor
+        for i in range(2):
+            shutil.copytree(root / f"test_{i:03d}", root / f"val_{i:03d}")
+        (root / "val_001/albedo.png").unlink()
         for old, new in ((0, 49), (1, 199)):
             (root / f"test_{old:03d}").rename(root / f"test_{new:03d}")
 

@@ -96,6 +96,10 @@ def run(args: argparse.Namespace) -> int:
         if len(args.targets) > 1:
             print(f"{target}:")
         print_scores(scores)
+        if args.lights == "low":
+            from splitnerf.evaluate.published.scoring import table_of_lights
+
+            print(table_of_lights(scores, f"{scene_name(target)}, this scene"))
     if args.table:
         from splitnerf.evaluate.score_table import evaluation_table
         from splitnerf.files import atomic_path

@@ -13,7 +13,7 @@ else:
     import tomli as tomllib
 
 # The paper's settings, or those of its released code, where they state them, and ours where they do not:
-# tests/python/test_config.py names the source of those that are theirs. Shares of the run stand for 20,000 steps.
+# tests/python/test_config.py names the source of most of theirs. Shares of the run stand for 20,000 steps.
 PAPER = dict(
     run=dict(preset="paper", steps=20000),
     surface=dict(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -58,6 +58,7 @@ ORB = (
     ("normals", "normals, 1 - cos", "{:.3f}"),
     ("chamfer", "chamfer, 2e3", "{:.2f}"),
 )
+LOW = "lights low"  # the paper's own choice: `--lights low` without a protocol
 PROTOCOLS = {
     "stanford-orb": Protocol(orb_layout, ORB, stanford_orb.score),
     "nerfactor": Protocol(view_folders, (*RELIT, *ALBEDO, NOVEL[0], NORMALS), views.nerfactor),
@@ -108,10 +109,19 @@ def published(name: str) -> dict:
     return json.loads(NUMBERS.read_text(encoding="utf-8")).get(name, {"source": None, "date": None, "rows": []})
 
 
-def table(name: str, ours: dict[str, float | None], label: str) -> str:
-    """Our scores above the published ones, as lines of text, without empty columns."""
+def table_of_lights(evaluation: dict, label: str) -> str:
+    """The scores of an evaluation with `--lights low` above those that were published so, and where they are from."""
+    parts = ("", evaluation["relight"]), ("albedo_", evaluation["albedo"] or {})
+    ours = {f"{prefix}{key}": scores.get(key) for prefix, scores in parts for key in ("psnr", "ssim", "lpips")}
+    known = published(LOW)
+    return f"{table(LOW, ours, label, (*RELIT, *ALBEDO))}\npublished: {known['source']} ({known['date']})"
+
+
+def table(name: str, ours: dict[str, float | None], label: str, columns: Sequence[Column] = ()) -> str:
+    """Our scores above the published ones, as lines of text, without empty columns; by default those of the protocol."""
     rows = [({"method": label} | ours), *published(name)["rows"]]
-    columns = [column for column in PROTOCOLS[name].columns if any(row.get(column[0]) is not None for row in rows)]
+    columns = columns or PROTOCOLS[name].columns
+    columns = [column for column in columns if any(row.get(column[0]) is not None for row in rows)]
     cells = [["", *(title for _, title, _ in columns)]]
     for row in rows:
         values = (row.get(key) for key, _, _ in columns)
