@@ -30,9 +30,12 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     takes the name, so that a power failure leaves the old one or the new one.
 
     Raises:
+        InputError: The path is a device, a pipe or a socket.
         OSError: The file cannot be written; the message names it, not the temporary one.
     """
     path = Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a device or a pipe, which is not replaced; give the name of a file")
     temporary = None
     try:
         _check_locked(path)
@@ -109,7 +112,8 @@ def remove_partial(folder: Path) -> None:
     """Removes half-written files of a killed program from a folder, and from folders in it that are not locked."""
     inner = (leftover for leftover in folder.glob(f"*/{PARTIAL}*") if not is_locked(leftover.parent))
     for leftover in (*folder.glob(f"{PARTIAL}*"), *inner):
-        leftover.unlink(missing_ok=True)
+        if not leftover.is_dir():
+            leftover.unlink(missing_ok=True)
 
 
 def is_own(folder: Path) -> bool:

@@ -340,6 +340,7 @@ def export_run(
         raise InputError(f"{out}: holds what a refinement fitted, which this would replace; give another --out")
     refuse_no_run(run)
     check_results(out, run, overwrite=overwrite)
+    read_origin(run)  # before anything is written
     own = own_results(out, run)
     if own and placing.moves:
         raise InputError(
@@ -371,9 +372,22 @@ def export_run(
     return exported
 
 
+def read_origin(run: Path) -> np.ndarray:
+    """[3] where the data's origin is in the run's files; 0 without a file. Raises InputError where the file is damaged."""
+    if not (run / ORIGIN).is_file():
+        return np.zeros(3)
+    try:
+        origin = np.array(read_json(run / ORIGIN, "origin")["origin"], np.float64)
+    except (ValueError, TypeError, KeyError, OverflowError):
+        origin = np.zeros(0)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise InputError(f"{run / ORIGIN}: does not hold three numbers as 'origin'; repair it")
+    return origin
+
+
 def write_origin(out: Path, run: Path, exported: Exported) -> None:
     """Writes where the data's world is in the files of an export, if it is not as they are."""
-    known = np.array(read_json(run / ORIGIN, "origin")["origin"] if (run / ORIGIN).is_file() else [0.0, 0.0, 0.0])
+    known = read_origin(run)
     origin = known + exported.origin
     meaning = "divide positions by the scale and add the origin to get those of the data"
     if origin.any() or exported.scale != 1:

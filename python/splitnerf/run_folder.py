@@ -9,8 +9,9 @@ from pathlib import Path
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import EXPOSURES, Dataset
-from splitnerf.data.frames import layout_of, refuse_data
+from splitnerf.data.frames import layout_of, refuse_data, run_in
 from splitnerf.data.json_files import read_json, write_json
+from splitnerf.data.reading import SEPARATED
 from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
@@ -20,11 +21,18 @@ from splitnerf.training.metrics import METRICS
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 DATA = "data.json"  # where the photos of the run are
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
+PREVIEWS = "previews"
 REFINED = "refined"  # the folder in a run of what `refine` made of it
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
 RUN_FILES += (ORIGIN, DATA, EXPOSURES, *REFINEMENT_FILES)
-EXPORTED = ("mesh.obj", "mesh.mtl", "mesh.usdz")  # by request, beside those of a run
+TEXTURES = ("albedo", "normal", "roughness", "metallic")
+EXPORTED = (
+    "mesh.obj",
+    "mesh.mtl",
+    "mesh.usdz",
+    *(f"mesh_{name}.png" for name in TEXTURES),
+)  # by request, beside those of a run
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
@@ -34,6 +42,9 @@ def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
     if run.exists() and not run.is_dir():
         raise InputError(f"{run}: is a file; give --out a folder")
     refuse_data(run)
+    refuse_links(run)
+    if not present_in(run) and any((run / PREVIEWS).glob("step_*.png")):
+        raise InputError(f"{run / PREVIEWS}: is of no run, and would be replaced; give another --out")
     if not (resume or overwrite) and present_in(run):
         raise InputError(
             f"{run}: holds a run already; continue with --resume, replace it with --overwrite, or give another --out"
@@ -42,12 +53,21 @@ def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
         raise InputError(f"{run / present_in(run)[0]}: is of no run, and would be deleted; give another --out")
 
 
+def refuse_links(run: Path) -> None:
+    """Raises InputError where a folder of a run is a link: what it points to is not the run's."""
+    for name in (TRAINED, REFINED, PREVIEWS, SEPARATED):
+        if (run / name).is_symlink():
+            raise InputError(f"{run / name}: is a link, and files there would be replaced; remove it")
+
+
 def refuse_no_run(run: Path) -> None:
     """Raises InputError where a path is no folder, or a data set's."""
     if not run.is_dir():
         raise InputError(f"{run}: no such run; train one with `splitnerf train DATA --out {run}`")
     if layout_of(run) is not None:
         raise InputError(f"{run}: is a data set, not a run; train one with `splitnerf train {run} --out RUN`")
+    if not (run / "checkpoint.pt").is_file() and (inner := run_in(run)):
+        raise InputError(f"{run}: holds runs; give one, such as {inner}")
 
 
 def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
@@ -55,7 +75,7 @@ def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
     where they would replace a data set, what belongs to another run or, unless ``overwrite``, other files."""
     refuse_data(out)
     if own_results(out, run):
-        return
+        return refuse_links(run)
     if (out / "checkpoint.pt").exists():
         raise InputError(f"{out}: holds another run, whose results would be replaced; give another --out")
     present = [name for name in (*RUN_FILES, *EXPORTED) if (out / name).exists()]
@@ -96,15 +116,16 @@ def present_in(run: Path) -> list[str]:
 
 def is_run(run: Path) -> bool:
     """Whether a folder holds a run, which begins with its settings."""
+    settings = run / "config.toml"
     try:
-        return (run / "checkpoint.pt").is_file() or bool(Config.read(run / "config.toml"))
+        return (run / "checkpoint.pt").is_file() or (bool(Config.read(settings)) and "[run]" in settings.read_text())
     except InputError:
         return False
 
 
 def clear_run(run: Path) -> None:
     """Deletes the files of a run, and nothing else."""
-    previews = list((run / "previews").glob("step_*.png")) if is_run(run) else []
+    previews = list((run / PREVIEWS).glob("step_*.png")) if is_run(run) else []
     discard_refinement(run)
     for path in [*previews, *(run / name for name in RUN_FILES)]:
         path.unlink(missing_ok=True)

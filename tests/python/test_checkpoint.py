@@ -87,6 +87,14 @@ def calling(function: Callable, *arguments: object) -> Callable[[Path], None]:
     return lambda path: repack(path, lambda _: pickle.dumps(content, protocol=2))
 
 
+def flip_a_bit(path: Path) -> None:
+    with zipfile.ZipFile(path) as archive:
+        largest = max(archive.infolist(), key=lambda part: part.file_size)
+    raw = bytearray(path.read_bytes())
+    raw[largest.header_offset + 400 + largest.file_size // 2] ^= 0x80
+    path.write_bytes(raw)
+
+
 DAMAGED = {
     "a shell's command": (calling(os.system, "touch owned"), "not a readable checkpoint .it asks for"),
     "a line of Python": (calling(eval, "open('owned', 'w')"), "not a readable checkpoint .it asks for"),
@@ -98,6 +106,7 @@ DAMAGED = {
         lambda path: repack(path, lambda pickled: pickled + bytes(LONGEST_PICKLE + 1 - len(pickled))),
         "its pickle is too long",
     ),
+    "a bit that flipped": (flip_a_bit, "the checksum of .* is wrong"),
     "no file": (Path.unlink, "no checkpoint there"),
     "another format": (
         lambda path: torch.save(torch.load(path, weights_only=True) | {"format": 1}, path),

@@ -172,6 +172,9 @@ def test_no_words_at_all_print_the_help(capsys, monkeypatch):
 
 ELSEWHERE = {  # the folder that is given, and what stands in the one line
     "photos": ("photos", "holds photos without cameras; `splitnerf prepare"),
+    "photos in a folder": ("album", "holds photos without cameras in "),
+    "a video": ("turn.mp4", "is a video, whose cameras are not known; `splitnerf prepare"),
+    "runs": ("runs", "holds runs; give one, such as "),
     "a part of data": ("data/train", "is a part of the data set"),
     "data sets": ("", "holds data sets; give one, such as"),
     "a run": ("runs/run", "is a run; look at it by `splitnerf view"),
@@ -184,8 +187,8 @@ def test_data_that_are_none_are_named(case, data, tmp_path, capsys, monkeypatch)
     """Before it is asked where to write: without --out a run would be its own."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(data, tmp_path / "data")
-    for name in ("photos/a.JPG", "runs/run/checkpoint.pt", "empty/notes.txt"):
-        (tmp_path / name).parent.mkdir(parents=True)
+    for name in ("photos/a.JPG", "album/trip/b.jpg", "turn.mp4", "runs/run/checkpoint.pt", "empty/notes.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     folder, said = ELSEWHERE[case]
     assert main(["train", str(tmp_path / folder)]) == BAD_INPUT
@@ -194,6 +197,10 @@ def test_data_that_are_none_are_named(case, data, tmp_path, capsys, monkeypatch)
 
 
 @pytest.mark.parametrize("words", [("export",), ("evaluate",), ("refine", "--data", "data")])
-def test_a_run_that_is_data_is_named(words, data, capsys):
+def test_a_run_that_is_data_or_a_folder_of_runs_is_named(words, data, tmp_path, capsys):
     assert main([words[0], str(data), *words[1:]]) == BAD_INPUT
     assert "is a data set, not a run; train one with" in capsys.readouterr().err
+    (tmp_path / "runs/a").mkdir(parents=True)
+    (tmp_path / "runs/a/checkpoint.pt").touch()
+    assert main([words[0], str(tmp_path / "runs"), *words[1:]]) == BAD_INPUT
+    assert f"holds runs; give one, such as {tmp_path / 'runs/a'}" in capsys.readouterr().err

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, beside, triangle
 from splitnerf.data.gltf import document, geometry, read_asset
-from splitnerf.data.images import srgb_to_linear
+from splitnerf.data.images import decode_image, encode_png, srgb_to_linear
 from splitnerf.errors import InputError
 
 
@@ -255,6 +255,19 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatc
         else:
             with pytest.raises(InputError, match="needs more than half of the available memory"):
                 read_asset(path)
+
+
+def test_what_a_file_does_not_hold_costs_more(path):
+    """Numbers without a buffer, and the pixels of a texture before they are unpacked."""
+    gltf = triangle()
+    gltf.json["accessors"].append({"componentType": 5126, "count": 1 << 17, "type": "VEC3"})
+    gltf.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 1
+    with pytest.raises(InputError, match="unpacks to more than its size makes likely"):
+        read_asset(gltf.write(path))
+    grey, asked = encode_png(np.zeros((8, 16, 1))), []
+    with pytest.raises(ZeroDivisionError):
+        decode_image(grey[:60], "x", lambda n_values: asked.append(n_values) or 1 / 0)
+    assert asked == [8 * 16 * 3]
 
 
 def test_many_nodes_are_told_of(path, capsys, monkeypatch):

@@ -376,5 +376,11 @@ def test_a_run_far_from_the_origin_says_where_it_is(tmp_path, capsys):
     assert command("export", run, "--out", tmp_path / "asset", "--formats", "ply") == DONE
     exported = json.loads((tmp_path / "asset/origin.json").read_text())
     assert exported["origin"] == stored["origin"] and exported["scale"] == 1
+    for origin in ("x", [1, 2], None, ["x"] * 3, [float("nan")] * 3):
+        (run / "origin.json").write_text(json.dumps({"origin": origin}))
+        assert command("export", run, "--out", tmp_path / "other", "--formats", "ply") == BAD_INPUT
+        assert not (tmp_path / "other").exists()
+        assert "origin.json: does not hold three numbers as 'origin'" in capsys.readouterr().err
+    (run / "origin.json").write_text(json.dumps(stored))
     scores = json.loads((run / "evaluation.json").read_text())["novel_view"]
     assert scores["psnr"] > 8

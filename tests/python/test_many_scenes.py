@@ -71,6 +71,16 @@ def test_a_damaged_state_is_refused(tmp_path, text):
         known_scenes(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["../other", "/abs/run", 5, ""])
+def test_a_run_lies_within_the_batch(tmp_path, name):
+    keep_scenes(tmp_path, [Scene("a", "/data")])
+    content = json.loads((tmp_path / "batch.json").read_text())
+    content["scenes"][0]["name"] = name
+    (tmp_path / "batch.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match="batch.json: is damaged"):
+        known_scenes(tmp_path)
+
+
 # ---- options ----
 
 

@@ -29,6 +29,7 @@ from op_checks import arguments_of, as_tuple, check_op, devices, floats, generat
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
 from splitnerf import _core
 from splitnerf.ops import linear_to_srgb
+from splitnerf.ops.training import quadratic_entropy
 from splitnerf_tools.doctor import cases
 from torch.autograd import forward_ad
 from torch.utils.checkpoint import checkpoint
@@ -270,6 +271,14 @@ def test_a_second_derivative_raises(name):
     first = torch.autograd.grad(weighted([x**2 for x in results(name, inputs)]), leaves, create_graph=True)
     with pytest.raises(RuntimeError, match="no gradient is defined|once_differentiable"):
         sum(x.sum() for x in first).backward()
+
+
+def test_a_second_derivative_of_the_entropy_raises_for_a_constant_cotangent():
+    """Its gradient was computed with its value, and would look like a constant."""
+    x = torch.rand(64, 3, requires_grad=True)
+    (first,) = torch.autograd.grad(quadratic_entropy(x), x, create_graph=True)
+    with pytest.raises(RuntimeError, match="quadratic_entropy: no gradient is defined of its gradient"):
+        first.square().sum().backward()
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -1,5 +1,6 @@
 """A user's own files are never lost: the program deletes and replaces what it can show to be its own."""
 
+import os
 import shutil
 
 import cv2
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.errors import InputError
-from splitnerf.files import LOCK, is_own, locked, own_folder
+from splitnerf.files import LOCK, atomic_path, is_own, locked, own_folder
 from splitnerf_tools.capture.photographs import find_photographs
 from splitnerf_tools.capture.prepare import fingerprint
 from splitnerf_tools.separation.separate import separate
@@ -118,17 +119,55 @@ def test_what_a_refinement_fitted_or_begins_with_is_not_replaced(done, mine, cap
     assert contents(mine) | contents(done) == before
 
 
-def test_previews_of_no_run_stay(data, mine):
+@pytest.mark.parametrize("words", [(), ("--overwrite",)])
+def test_previews_of_no_run_stay(data, mine, capsys, words):
+    """Nor does an empty file of settings make a run of a folder."""
     (mine / "previews").mkdir()
-    (mine / "previews/step_1.png").write_bytes(b"mine")
-    assert train(data, mine, "--steps", "1", "--overwrite") == DONE
-    assert (mine / "previews/step_1.png").read_bytes() == b"mine"
+    (mine / "previews/step_000002.png").write_bytes(b"mine")
+    assert "previews: is of no run" in refused(capsys, "train", data, "--out", mine, *words)
+    for name in ("config.toml", "mesh.glb"):
+        (mine / name).touch()
+    said = "is of no run" if words else "holds a run already"
+    assert said in refused(capsys, "train", data, "--out", mine, *words) and (mine / "mesh.glb").exists()
+    assert (mine / "previews/step_000002.png").read_bytes() == b"mine"
 
 
-def test_an_export_is_replaced_as_asked(done, mine):
-    (mine / "mesh.obj").write_text("mine")
+@pytest.mark.parametrize("name", ["trained", "refined", "previews", "separated"])
+def test_links_in_a_run_lead_nowhere(data, done, mine, capsys, name):
+    """An archive of somebody's may hold them."""
+    for file in ("mesh.glb", "environment.exr", "step_000002.png"):
+        (mine / file).write_text("mine")
+    before = contents(mine)
+    shutil.rmtree(done / name, ignore_errors=True)
+    (done / name).symlink_to(mine)
+    assert f"{name}: is a link" in refused(capsys, "train", data, "--out", done, "--overwrite")
+    assert f"{name}: is a link" in refused(capsys, "export", done, "--out", done / "trained")
+    assert f"{name}: is a link" in refused(capsys, "refine", done, "--data", data)
+    assert contents(mine) == before
+
+
+def test_only_files_are_replaced(data, done, mine, capsys):
+    os.mkfifo(mine / "pipe")
+    with (
+        pytest.raises(InputError, match="pipe: is a device or a pipe, which is not replaced"),
+        atomic_path(mine / "pipe"),
+    ):
+        pass
+    for name in ("index.html", "chair_evaluation.json"):
+        (mine / name).write_text("mine")
+    shutil.copy(done / "mesh.glb", mine / "chair.glb")
+    assert "index.html: is no earlier page" in refused(capsys, "inspect", data, "--out", mine / "index.html")
+    said = refused(capsys, "evaluate", mine / "chair.glb", "--data", data)
+    assert "chair_evaluation.json: is not an earlier result" in said
+    assert [(mine / name).read_text() for name in ("index.html", "chair_evaluation.json")] == ["mine"] * 2
+
+
+@pytest.mark.parametrize("name", ["mesh.obj", "mesh_albedo.png"])
+def test_an_export_is_replaced_as_asked(done, mine, capsys, name):
+    (mine / name).write_text("mine")
+    assert f"{name}: would be replaced" in refused(capsys, "export", done, "--out", mine, "--formats", "obj")
     assert command("export", done, "--out", mine, "--formats", "obj", "--overwrite") == DONE
-    assert (mine / "mesh.obj").read_text() != "mine"
+    assert (mine / name).read_bytes() != b"mine"
 
 
 def test_a_sheet_replaces_nothing(data, done, mine, capsys):

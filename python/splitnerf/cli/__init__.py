@@ -36,7 +36,7 @@ COMMANDS = {"reconstruction": (train, refine), "results": (export, relight, eval
 def build_parser() -> Parser:
     parser = Parser(
         prog="splitnerf",
-        description="From posed images of one object to a mesh, PBR materials and the HDR environment.",
+        description="From photographs of one object with known cameras to a mesh, PBR materials and the HDR environment.",
     )
     parser.add_argument("--version", action="version", version=f"splitnerf {splitnerf.__version__}")
     parser.add_argument(

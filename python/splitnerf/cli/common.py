@@ -201,7 +201,7 @@ def print_summary(
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")
     name, relit = (quote(str(path)) for path in (run, run / "relit"))
     print(f"look at it: splitnerf view {name}")
-    print(f"in another light: splitnerf relight {name} --env MAP.hdr --turntable 60 --gif --out {relit}")
+    print(f"in another light: splitnerf relight {name} --env studio --turntable 60 --gif --out {relit}")
 
 
 def print_refinement(summary: dict | None) -> None:
@@ -217,6 +217,11 @@ def print_refinement(summary: dict | None) -> None:
     print(f"refinement, on the photos: {', '.join(changes)}, in {summary['steps']} steps, {summary['seconds']:.0f} s")
     if summary["lamp"]:
         print("a lamp that training had smeared was made compact first; photos do not tell which of the two it was")
+    before, after = summary["held_out_psnr"]
+    if after < before and summary["level"] != 1:
+        print(
+            f"photos held out fit less well since the light is {summary['level']:.2f} times as bright, as highlights ask"
+        )
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
     if summary["detail"]:

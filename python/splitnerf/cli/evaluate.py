@@ -113,9 +113,9 @@ def run(args: argparse.Namespace) -> int:
 def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
     where two options exclude each other, or a file would be lost; the message names them."""
-    from splitnerf.evaluate.published.scoring import holds_published
+    from splitnerf.evaluate.published.scoring import holds_published, published_path
     from splitnerf.evaluate.score_table import holds_table
-    from splitnerf.evaluate.scoring import holds_evaluation
+    from splitnerf.evaluate.scoring import evaluation_path, holds_evaluation, is_asset
     from splitnerf.run_folder import data_of
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
@@ -146,7 +146,10 @@ def check_usage(args: argparse.Namespace) -> None:
     if args.sheet is not None and args.sheet.exists():
         raise InputError(f"{args.sheet}: exists, and would be replaced; give another --sheet")
     holds = holds_published if args.protocol else holds_evaluation
-    for name, path, is_ours in (("table", args.table, holds_table), ("out", args.out, holds)):
+    assets = [target for target in args.targets if is_asset(target) and args.data]  # a run's scores are in its folder
+    beside = [published_path(asset, args.protocol) if args.protocol else evaluation_path(asset) for asset in assets]
+    outs = [("out", path, holds) for path in ([args.out] if args.out else beside)]
+    for name, path, is_ours in (("table", args.table, holds_table), *outs):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
             raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --{name}")
 

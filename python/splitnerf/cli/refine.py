@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from splitnerf.cli.common import DONE, INTERRUPTED, add_reading_options, examples, reading_of
 from splitnerf.errors import InputError
@@ -74,4 +75,5 @@ def run(args: argparse.Namespace) -> int:
         print(f"coverage at the outline, squared error: {refined.outline[0]:.2g} -> {refined.outline[-1]:.2g}")
     print(f"colours, squared error: {first.error:.3g} -> {last.error:.3g} in {last.number} steps, {last.seconds:.0f} s")
     print(f"results: {out / 'mesh.glb'}, {out / 'environment.exr'}")
+    print(f"look at it: splitnerf view {quote(str(out / 'mesh.glb'))}")
     return DONE

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "train",
-        help="reconstruct an object from posed images",
+        help="reconstruct an object from photographs with known cameras",
         description="Trains on DATA (transforms files, COLMAP's, NeuS's and other layouts, see docs/data.md), fits the exported asset and its light "
         "to the photos, and writes mesh.glb, mesh.ply, environment.exr/.hdr, evaluation.json and "
         "report.html into the run's folder.",
@@ -41,7 +41,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
     )
     add = parser.add_argument
-    add("data", type=Path, metavar="DATA", help="folder of posed images; without masks the object is searched for")
+    add(
+        "data",
+        type=Path,
+        metavar="DATA",
+        help="folder of photographs with cameras; without masks the object is searched for",
+    )
     add("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_training_options(parser)
     add("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")

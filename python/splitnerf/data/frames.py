@@ -18,6 +18,7 @@ LAYOUTS = (stanford_orb, transforms, view_folders, neus, colmap)
 TEST_STRIDE = 8
 WORDS = {"train": r"(?<![a-z])train", "test": r"(?<![a-z])(test|eval)"}  # in the path of a split's image
 PHOTOS = (".jpg", ".jpeg", ".png", ".heic", ".tif", ".tiff", ".webp", ".dng", ".cr2", ".nef", ".arw")
+VIDEOS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
 FAR = 1e3  # distances between the cameras; farther from the origin, float32 loses what pixels show
 
 
@@ -64,19 +65,34 @@ def layout_of(root: Path) -> ModuleType | None:
 
 def what_is_in(folder: Path) -> str:
     """What a folder without a layout holds instead, and what to do with it; "" where that is unknown."""
+    prepare = f"`splitnerf prepare {folder} --out DATA` finds these"
+    if folder.is_file():
+        return f"is a video, whose cameras are not known; {prepare}" if folder.suffix.lower() in VIDEOS else ""
     if not folder.is_dir():
         return ""
     if (folder / "checkpoint.pt").is_file():
         return f"is a run; look at it by `splitnerf view {folder}`, or continue it by --resume with its data"
     if layout_of(folder.resolve().parent) is not None:
         return f"is a part of the data set {folder.resolve().parent}; give that"
+    if inner := run_in(folder):
+        return f"holds runs; give one, such as {inner}"
     inside = sorted(folder.iterdir())
     for path in inside:
         if path.is_dir() and layout_of(path) is not None:
             return f"holds data sets; give one, such as {path}"
     if any(path.suffix.lower() in PHOTOS for path in inside):
-        return f"holds photos without cameras; `splitnerf prepare {folder} --out DATA` finds these"
-    return ""
+        return f"holds photos without cameras; {prepare}"
+    nested = next((path.parent for path in sorted(folder.glob("*/*")) if path.suffix.lower() in PHOTOS), None)
+    return (
+        ""
+        if nested is None
+        else f"holds photos without cameras in {nested}; {prepare.replace(str(folder), str(nested))}"
+    )
+
+
+def run_in(folder: Path) -> Path | None:
+    """The first run that lies in a folder, or None."""
+    return next((path.parent for path in sorted(folder.glob("*/checkpoint.pt"))), None)
 
 
 def refuse_data(folder: Path) -> None:

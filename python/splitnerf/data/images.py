@@ -8,7 +8,7 @@ import re
 import shutil
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import product
 from pathlib import Path
@@ -156,12 +156,15 @@ def is_written_here(path: Path) -> bool:
     return head.startswith(SIGNATURES[2]) and said in head
 
 
-def decode_image(data: bytes, name: str) -> np.ndarray:
-    """Decodes an image file in memory like :func:`read_image`; messages name it `name`. Raises InputError where the
-    data are unreadable, truncated, of another format or too large."""
+def decode_image(data: bytes, name: str, spend: Callable[[int], None] = lambda n_values: None) -> np.ndarray:
+    """Decodes an image file in memory like :func:`read_image`; messages name it `name`. `spend` is told the number of values
+    before they are unpacked, and may refuse it. Raises InputError where the data are unreadable, truncated, of another format
+    or too large."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "image"
         path.write_bytes(data)
+        with _opened(path, name) as (_, spec):
+            spend(spec.width * spec.height * max(3, spec.nchannels))
         return _read(path, name)
 
 

@@ -64,6 +64,8 @@ def _check_container(path: Path) -> None:
             raise ValueError("its parts are compressed")
         if sum(entry.file_size for entry in entries) > path.stat().st_size:
             raise ValueError("its parts are longer than the file")
+        if damaged := archive.testzip():
+            raise ValueError(f"the checksum of {damaged} is wrong")
         for entry in entries:
             if entry.filename.endswith(".pkl"):
                 if entry.file_size > LONGEST_PICKLE:

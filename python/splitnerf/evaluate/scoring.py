@@ -336,6 +336,6 @@ def is_evaluation(content: dict) -> bool:
             if not isinstance(value, dict) or measure[0] not in value:
                 return False
             value = value[measure[0]]
-        if type(value) not in (int, float, type(None)):
+        if type(value) not in (int, float, type(None)) or abs(value or 0) > 1e300:
             return False
     return True

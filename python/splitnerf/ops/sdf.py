@@ -170,6 +170,8 @@ class HashGrid(nn.Module):
 
     def __init__(self, spec: HashGridSpec, init_scale: float = 1e-4, table_dtype: torch.dtype | None = None):
         super().__init__()
+        if not isinstance(spec, HashGridSpec):
+            raise TypeError(f"HashGrid: spec must be a HashGridSpec, got {type(spec).__name__}")
         if table_dtype not in (None, torch.float16):
             raise ValueError(f"table_dtype must be torch.float16 or None, got {table_dtype}")
         self.spec = spec

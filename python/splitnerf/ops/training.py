@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Mapping
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
 from splitnerf.ops._library import front, lib, refuse_gradients, register
 from splitnerf.ops.sdf import TableCopy
@@ -113,12 +112,23 @@ def _gradient_backward(ctx, grad, _):
 def _keep_gradient(ctx, inputs, output):
     ctx.mark_non_differentiable(output[1])
     ctx.set_materialize_grads(False)  # else zeros are made for it
-    ctx.save_for_backward(output[1])
+    ctx.save_for_backward(output[1], *inputs)
 
 
-@once_differentiable
+class _FirstOnly(torch.autograd.Function):
+    """A first derivative that depends on x, of which no further one is defined."""
+
+    @staticmethod
+    def forward(ctx, value: Tensor, x: Tensor) -> Tensor:
+        return value.view_as(value)
+
+    @staticmethod
+    def backward(ctx, _) -> None:
+        raise RuntimeError("quadratic_entropy: no gradient is defined of its gradient; see the table in docs/ops.md")
+
+
 def _entropy_backward(ctx, grad, _):
-    return None if grad is None else ctx.saved_tensors[0] * grad
+    return None if grad is None else _FirstOnly.apply(ctx.saved_tensors[0] * grad, ctx.saved_tensors[1])
 
 
 register("pixel_losses", fake=lambda mean, *rest: mean.new_empty(2), gradients="mean opacity")

@@ -255,7 +255,13 @@ def record_of(refined: Refined, seconds: float) -> dict:
 
 def refinement_summary(run: Path) -> dict:
     """The changes by the refinement of a run; pairs are before and after."""
-    record = read_json(run / RECORD, "sweeps")
+    try:
+        return _summary(read_json(run / RECORD, "sweeps"))
+    except (KeyError, TypeError, IndexError, ValueError, OverflowError):
+        raise InputError(f"{run / RECORD}: is damaged; refine the run again") from None
+
+
+def _summary(record: dict) -> dict:
     sweeps, outline = record["sweeps"], record["outline"]
     return {
         "steps": len(sweeps),
@@ -264,6 +270,7 @@ def refinement_summary(run: Path) -> dict:
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
+        "level": float(record.get("level", 1.0)),
         "normal_texture": record.get("normal_texture", True),  # runs from before it could be left out
         "detail": record.get("detail"),  # runs from before there was any
         "lamp": record["lamp"] is not None,

@@ -96,7 +96,10 @@ def known_scenes(out: Path) -> list[Scene]:
         raise InputError(f"{path}: is not of this version of the program; give another --out")
     names = {f.name for f in fields(Scene)}
     try:
-        return [Scene(**{key: entry[key] for key in names}) for entry in content["scenes"]]
+        scenes = [Scene(**{key: entry[key] for key in names}) for entry in content["scenes"]]
+        if not all(re.fullmatch(r"[\w+=@][\w.+=@-]*", scene.name, re.ASCII) for scene in scenes):  # a path, perhaps
+            raise TypeError
+        return scenes
     except (KeyError, TypeError):
         raise InputError(f"{path}: is damaged; remove it: the runs stay and are continued") from None
 

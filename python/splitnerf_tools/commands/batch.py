@@ -39,7 +39,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf batch scenes/* --out runs/all --max-minutes 30 --address 10.0.0.1:6379",
         ),
     )
-    parser.add_argument("scenes", type=Path, nargs="+", metavar="SCENES", help="folders of posed images")
+    parser.add_argument("scenes", type=Path, nargs="+", metavar="SCENES", help="folders of photographs with cameras")
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table"
     )

@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
     from splitnerf.files import locked, own_folder
     from splitnerf.pipeline import reconstruct
-    from splitnerf.run_folder import check_run
+    from splitnerf.run_folder import check_run, present_in
 
     from splitnerf_tools.demo.scene import write_demo_dataset
 
@@ -45,6 +45,11 @@ def run(args: argparse.Namespace) -> int:
     settings = {"run.seed": args.seed, "refinement.enabled": not args.no_refine, **budget(None, args.max_minutes)}
     config, data = preset("cpu").replace(settings), args.out / "data"
     with locked(args.out):
+        if present_in(args.out) and not args.overwrite:
+            again = f"continue with `splitnerf train {data} --out {args.out} --resume`"
+            raise InputError(
+                f"{args.out}: holds a run already; {again}, replace it with --overwrite, or give another --out"
+            )
         check_run(args.out, resume=False, overwrite=args.overwrite)
         if not args.overwrite:
             refuse_data(data)

@@ -20,7 +20,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "small or clipped objects. Draws it, with all masks over their photos, on a page. Exit code 2: DATA cannot be read.",
         epilog=examples("splitnerf inspect data", "splitnerf inspect data --out looks.html"),
     )
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of posed images")
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of photographs with cameras")
     parser.add_argument(
         "--out",
         type=Path,
@@ -37,11 +37,13 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf.pipeline import load_splits
 
     from splitnerf_tools.inspection.checks import inspect
-    from splitnerf_tools.inspection.inspect_page import write_page
+    from splitnerf_tools.inspection.inspect_page import holds_page, write_page
 
     page = args.out / PAGE if args.out.is_dir() else args.out
     if page.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{page}: is not a page; give --out a name that ends in .html, or a folder")
+    if page.exists() and not holds_page(page):
+        raise InputError(f"{page}: is no earlier page of this command, and would be replaced; give another --out")
     reading = reading_of(args, args.data)
     found = inspect(*load_splits(args.data, args.downscale, reading), reading)
     for finding in found.findings:

@@ -65,6 +65,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"prepare needs {' and '.join(missing)}; pip install 'splitnerf[photos]'")
     if not 0 <= args.seed < 1 << 31:
         raise InputError(f"--seed must be at least 0 and less than {1 << 31}, got {args.seed}")
+    if args.frames < 3 or args.max_size < 0:
+        wrong = f"--frames must be at least 3, got {args.frames}"
+        raise InputError(wrong if args.frames < 3 else f"--max-size must not be negative, got {args.max_size}")
     from splitnerf.progress import Progress, ended_by_signals
 
     from splitnerf_tools.capture.prepare import PrepareSettings, prepare

@@ -169,7 +169,7 @@ def write_demo_dataset(
                 normals=demo.normals,
                 spp=spp,
                 clamp_indirect=1.0,
-                seed=(seed * 2 + (split == "test")) * 65536 + i,
+                seed=((seed * 2 + (split == "test")) * 65536 + i) % (1 << 31),
             )
             writer.view(split, i, pose, images)
     writer.mesh(demo.vertices, demo.triangles)

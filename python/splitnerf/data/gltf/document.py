@@ -19,7 +19,8 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 GLB_HEADER, CHUNK_HEADER = 12, 8
 LEAST_VALUES, MOST_VALUES, VALUES_PER_BYTE = 1 << 22, 1 << 30, 4096
-BYTES_OF_VALUE, BYTES_OF_PIXEL = 40, 8  # that a number of an accessor or of a texture takes while the asset is made
+BYTES_OF_VALUE, BYTES_OF_PIXEL = 40, 12  # that a number of an accessor or of a texture takes while the asset is made
+OF_NOTHING = 64  # how many numbers one counts as that the file does not store
 MEMORY_SHARE = 0.5  # of what is available, for one file
 
 
@@ -68,7 +69,8 @@ class Document:
         accessor = self.json["accessors"][index]
         dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
         count = accessor["count"]
-        self.spend(max(0, count) * width, BYTES_OF_VALUE)
+        empty = not {"bufferView", "sparse"} & accessor.keys()  # numbers of no bytes at all
+        self.spend(max(0, count) * width * (OF_NOTHING if empty else 1), BYTES_OF_VALUE)
         values = np.zeros((count, width), dtype)
         if "bufferView" in accessor:
             values = self._table(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)

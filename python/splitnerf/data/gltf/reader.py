@@ -194,8 +194,7 @@ class TextureSlots:
                 f"{document.path}: a texture of material '{self.name}' comes as {kinds}; export it with PNG or JPEG"
             )
         data, image = document.image(texture.get("source", webp.get("source")))
-        pixels = decode_image(data, image)
-        document.spend(pixels.size, BYTES_OF_PIXEL)
+        pixels = decode_image(data, image, lambda n_values: document.spend(n_values, BYTES_OF_PIXEL))
         if not np.isfinite(pixels).all():
             raise InputError(f"{image}: has NaN or infinite pixels; clean it and export again")
         return pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
