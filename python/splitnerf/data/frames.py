@@ -82,12 +82,10 @@ def what_is_in(folder: Path) -> str:
             return f"holds data sets; give one, such as {path}"
     if any(path.suffix.lower() in PHOTOS for path in inside):
         return f"holds photos without cameras; {prepare}"
-    nested = next((path.parent for path in sorted(folder.glob("*/*")) if path.suffix.lower() in PHOTOS), None)
-    return (
-        ""
-        if nested is None
-        else f"holds photos without cameras in {nested}; {prepare.replace(str(folder), str(nested))}"
-    )
+    nested = {path.parent for path in folder.glob("*/*") if path.suffix.lower() in PHOTOS}
+    if len(nested) != 1:  # several are parts of data that lack their cameras
+        return ""
+    return f"holds photos without cameras in {(inner := nested.pop())}; {prepare.replace(str(folder), str(inner))}"
 
 
 def run_in(folder: Path) -> Path | None:
