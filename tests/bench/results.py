@@ -226,7 +226,8 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     facts = provenance(SOURCES, f"make results PAGE={name}") | {"commit": oldest["commit"], "date": oldest["date"][:10]}
     del facts["threads"]
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
-    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in ("scene", "minutes")]
+    always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
+    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]
     lines = [f"# {page.title}", "", header(facts), ""]
     if name == "time":
         draw(out / f"{name}.png", rows)
