@@ -16,23 +16,22 @@ from splitnerf.devices import refuse_one_processor
 from splitnerf.errors import InputError
 from splitnerf.plugins import installed
 from splitnerf.refinement.refine import RECORD, STATE, TRAINED
-from splitnerf.training.metrics import METRICS
+from splitnerf.training.metrics import METRICS, PREVIEWS
 
 ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 DATA = "data.json"  # where the photos of the run are
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
-PREVIEWS = "previews"
 REFINED = "refined"  # the folder in a run of what `refine` made of it
 REFINEMENT_FILES = (RECORD, STATE, *(f"{TRAINED}/{name}" for name in ASSET_FILES))
 RUN_FILES = ("config.toml", "checkpoint.pt", METRICS, "mesh.ply", *ASSET_FILES, "evaluation.json", "report.html")
 RUN_FILES += (ORIGIN, DATA, EXPOSURES, *REFINEMENT_FILES)
-TEXTURES = ("albedo", "normal", "roughness", "metallic")
+# By request, beside those of a run.
 EXPORTED = (
     "mesh.obj",
     "mesh.mtl",
     "mesh.usdz",
-    *(f"mesh_{name}.png" for name in TEXTURES),
-)  # by request, beside those of a run
+    *(f"mesh_{map}.png" for map in ("albedo", "normal", "roughness", "metallic")),
+)
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:

@@ -172,7 +172,7 @@ def test_no_words_at_all_print_the_help(capsys, monkeypatch):
 
 ELSEWHERE = {  # the folder that is given, and what stands in the one line
     "photos": ("photos", "holds photos without cameras; `splitnerf prepare"),
-    "photos in a folder": ("album", "holds photos without cameras in "),
+    "photos in a folder": ("out", "in a folder; `splitnerf prepare out/trip --out DATA`"),
     "a video": ("turn.mp4", "is a video, whose cameras are not known; `splitnerf prepare"),
     "runs": ("runs", "holds runs; give one, such as "),
     "a part of data": ("data/train", "is a part of the data set"),
@@ -187,11 +187,11 @@ def test_data_that_are_none_are_named(case, data, tmp_path, capsys, monkeypatch)
     """Before it is asked where to write: without --out a run would be its own."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(data, tmp_path / "data")
-    for name in ("photos/a.JPG", "album/trip/b.jpg", "turn.mp4", "runs/run/checkpoint.pt", "empty/notes.txt"):
+    for name in ("photos/a.JPG", "out/trip/b.jpg", "turn.mp4", "runs/run/checkpoint.pt", "empty/notes.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     folder, said = ELSEWHERE[case]
-    assert main(["train", str(tmp_path / folder)]) == BAD_INPUT
+    assert main(["train", folder or "."]) == BAD_INPUT
     (line,) = (line for line in capsys.readouterr().err.splitlines() if "note: " not in line)
     assert said in line
 

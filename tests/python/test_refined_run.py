@@ -419,6 +419,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     for changes, told in (
         ({}, f"{after:.2f} dB"),
         ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),
+        ({"level": 1.1}, "the light was made 1.10 times as bright"),
     ):
         print_refinement(summary | changes)
         assert told in capsys.readouterr().out

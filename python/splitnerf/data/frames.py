@@ -65,9 +65,9 @@ def layout_of(root: Path) -> ModuleType | None:
 
 def what_is_in(folder: Path) -> str:
     """What a folder without a layout holds instead, and what to do with it; "" where that is unknown."""
-    prepare = f"`splitnerf prepare {folder} --out DATA` finds these"
+    prepare = "`splitnerf prepare {} --out DATA` finds these".format
     if folder.is_file():
-        return f"is a video, whose cameras are not known; {prepare}" if folder.suffix.lower() in VIDEOS else ""
+        return f"is a video, whose cameras are not known; {prepare(folder)}" if folder.suffix.lower() in VIDEOS else ""
     if not folder.is_dir():
         return ""
     if (folder / "checkpoint.pt").is_file():
@@ -81,11 +81,11 @@ def what_is_in(folder: Path) -> str:
         if path.is_dir() and layout_of(path) is not None:
             return f"holds data sets; give one, such as {path}"
     if any(path.suffix.lower() in PHOTOS for path in inside):
-        return f"holds photos without cameras; {prepare}"
+        return f"holds photos without cameras; {prepare(folder)}"
     nested = {path.parent for path in folder.glob("*/*") if path.suffix.lower() in PHOTOS}
     if len(nested) != 1:  # several are parts of data that lack their cameras
         return ""
-    return f"holds photos without cameras in {(inner := nested.pop())}; {prepare.replace(str(folder), str(inner))}"
+    return f"holds photos without cameras in a folder; {prepare(nested.pop())}"
 
 
 def run_in(folder: Path) -> Path | None:

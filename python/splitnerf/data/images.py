@@ -35,9 +35,7 @@ LARGEST_IMAGE = 1 << 29  # values of an image in memory
 STORED = {"uint8": 8, "uint16": 16}  # bits of the values of files that are read as they are
 SRGB_CODES = (1, 13)  # of primaries and curve, as a PNG's cICP chunk says them
 UNCALIBRATED = 0xFFFF  # of EXIF: another colour space than sRGB
-RAMPS = np.array(
-    [[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], np.uint8
-)  # edges of a cube
+RAMPS = np.uint8([[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]])  # lines in a cube
 REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # x, y of red, green, blue and white
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
@@ -104,9 +102,10 @@ def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
     try:
         source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
         name = ImageCms.getProfileDescription(source).strip()
-        if colours.shape[2] != 3 and re.search("srgb|iec61966", name.lower()):
+        is_plain = colours.shape[2] == 3 and colours.dtype == np.uint8
+        if not is_plain and re.search("srgb|iec61966", name.lower()):
             return colours
-        if colours.shape[2] != 3 or colours.dtype != np.uint8:
+        if not is_plain:
             raise ValueError("only photos of 8 bits and three channels are converted")
         image, target = Image.fromarray(np.ascontiguousarray(colours)), ImageCms.createProfile("sRGB")
         intent = ImageCms.Intent.RELATIVE_COLORIMETRIC

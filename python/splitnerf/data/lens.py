@@ -135,7 +135,8 @@ def check_shape(lens: dict, size: tuple[int, int], path: object) -> None:
     w, h = lens.get("w", width), lens.get("h", height)
     if abs(width * h - height * w) > max(w, h):
         raise InputError(
-            f"{path}: is {width}x{height}, but its lens is stated for {w:g}x{h:g}; turn the image (an EXIF orientation is not used), or repair 'w' and 'h'"
+            f"{path}: is {width}x{height}, but its lens is stated for {w:g}x{h:g}; turn the image (an EXIF orientation is not "
+            "used), or repair 'w' and 'h'"
         )
 
 

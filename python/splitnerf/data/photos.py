@@ -293,13 +293,17 @@ def read_mask(path: Path) -> np.ndarray:
     values, most = np.flatnonzero(np.bincount(mask.ravel())), np.iinfo(mask.dtype).max
     if len(values) == 2:
         return np.where(mask == values[1], most, 0).astype(mask.dtype)
-    flat = maximum_filter(mask, (3, 3, 1)) == minimum_filter(mask, (3, 3, 1))
-    between = flat & (mask > values[0]) & (mask < values[-1])  # areas, where the edge of a shape has lines
-    if 2 < len(values) <= MOST_LABELS and (values[-1] < MOST_LABELS or between.mean() > LABELLED):
+    if 2 < len(values) <= MOST_LABELS and (values[-1] < MOST_LABELS or _share_between(mask) > LABELLED):
         raise InputError(
             f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black"
         )
     return mask if values[0] == 0 or len(values) > 2 else np.full_like(mask, most)
+
+
+def _share_between(mask: np.ndarray) -> float:
+    """The share of a mask in areas of one value between the least and the largest; soft edges are lines, and none."""
+    flat = maximum_filter(mask, (3, 3, 1)) == minimum_filter(mask, (3, 3, 1))
+    return float((flat & (mask > mask.min()) & (mask < mask.max())).mean())
 
 
 def _palette_entries(path: Path) -> np.ndarray | None:

@@ -17,6 +17,7 @@ from splitnerf.render.renderer import render_maps
 from splitnerf.training.step import StepNumbers
 
 METRICS = "metrics.jsonl"
+PREVIEWS = "previews"  # the folder in a run
 PREVIEW_EDGE = 256  # pixels, at most
 LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the last one are all logged
 
@@ -97,7 +98,7 @@ def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Da
         over_background(rgb, maps["alpha"])
         for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
     ]
-    path = run / "previews" / f"step_{step:06d}.png"
+    path = run / PREVIEWS / f"step_{step:06d}.png"
     write_image(path, np.concatenate(panels, axis=1).astype(np.float32))
     return path
 

@@ -63,7 +63,8 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
     """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
 
     Raises:
-        InputError: A photo has no mask, one of another size, one that may be another's, too, or one that is no mask, or all are black.
+        InputError: A photo has no mask, one of another size, one that may be another's, too, or one that is no mask, or all
+            are black.
     """
     found, stems = {}, {}
     for path in sorted(folder.iterdir()):

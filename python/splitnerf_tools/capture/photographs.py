@@ -19,7 +19,6 @@ from splitnerf.files import atomic_path
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
-VIDEO = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
 MAX_PIXELS = 200_000_000
@@ -99,10 +98,8 @@ def read_upright(path: Path) -> np.ndarray:
             raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
         exif, profile = _exif(image, path), image.info.get("icc_profile")
-        turn, space = (
-            TURNS.get(exif.get(ExifTags.Base.Orientation)),
-            exif.get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace),
-        )
+        turn = TURNS.get(exif.get(ExifTags.Base.Orientation))
+        space = exif.get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace)
         if image.has_transparency_data:
             note_once(f"{path.parent}: the alpha of photos is not used; give --masks if it is the object's", path.name)
         if space == UNCALIBRATED and not profile:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from PIL import Image
 from splitnerf.data.dataset import SURROUNDINGS
+from splitnerf.data.frames import VIDEOS
 from splitnerf.data.images import srgb_to_linear, write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.errors import InputError, note
@@ -20,7 +21,6 @@ from splitnerf.files import LOCK, atomic_path, is_own, locked, own_folder, reaso
 from splitnerf_tools.capture.masks import find_masks, given_masks, mask_files
 from splitnerf_tools.capture.page import write_page
 from splitnerf_tools.capture.photographs import (
-    VIDEO,
     Photograph,
     find_photographs,
     is_upright,
@@ -113,7 +113,7 @@ def _photographs(
     source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
 ) -> list[Photograph]:
     """The photos of a folder, or the frames of a video, which are written into `out/frames`."""
-    if source.suffix.lower() not in VIDEO:
+    if source.suffix.lower() not in VIDEOS:
         return find_photographs(source)
     folder, done = out / "frames", out / "frames" / "all"
     own_folder(folder, fingerprint([source], settings.frames))

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     page = args.out / PAGE if args.out.is_dir() else args.out
     if page.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{page}: is not a page; give --out a name that ends in .html, or a folder")
-    if page.exists() and not holds_page(page):
+    if page.is_file() and not holds_page(page):
         raise InputError(f"{page}: is no earlier page of this command, and would be replaced; give another --out")
     reading = reading_of(args, args.data)
     found = inspect(*load_splits(args.data, args.downscale, reading), reading)

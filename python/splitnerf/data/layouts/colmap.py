@@ -67,9 +67,10 @@ def read(root: Path, split: None = None) -> list[Frame]:
         raise InputError(f"{source}: has no registered image; give another model")
     used = [frame.mask_path for frame in frames if frame.mask_path is not None]
     if len({*used}) < len(used):
-        double = next(path for path in used if used.count(path) > 1)
+        double = next(frame for frame in frames if frame.mask_path and used.count(frame.mask_path) > 1)
+        whole = f"{double.image_path.name}.png"
         raise InputError(
-            f"{double}: may be the mask of several images; call masks by whole names, as {frames[0].image_path.name}.png"
+            f"{double.mask_path}: may be the mask of several images; call masks by whole names, as {whole}"
         )
     if not used and (root / MASKS).is_dir():
         note_once(f"{root / MASKS}: no image has a mask there", f"{frames[0].image_path.name}.png would be one")

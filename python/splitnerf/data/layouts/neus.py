@@ -45,13 +45,10 @@ def read(root: Path, split: None = None) -> list[Frame]:
             raise InputError(
                 f"{root / folder}: has {len(found)} images, {CAMERAS} has {len(matrices)} cameras; repair it"
             )
-    of_key, numbers = (
-        {_key(mask): mask for mask in masks},
-        [_key(image) for image in images if re.search(r"\d", image.stem)],
-    )
-    alone = sorted(image.name for image in images if masks and _key(image) not in of_key)
-    if alone:
+    of_key = {_key(mask): mask for mask in masks}
+    if alone := [image.name for image in images if masks and _key(image) not in of_key]:
         raise InputError(f"{root / MASKS}: has no mask of {alone[0]}; give each image one of its name or number")
+    numbers = [_key(image) for image in images if re.search(r"\d", image.stem)]
     if numbers != sorted(numbers):
         note_once(
             f"{root / IMAGES}: images are paired with cameras in the alphabet's order, which is not that of their numbers"
