@@ -13,12 +13,12 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import torch
 import trimesh
 
 from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
+from splitnerf.data.asset import ORIGIN, read_place
 from splitnerf.data.dataset import EXPOSURES, Dataset, dataset_fingerprint, load_dataset, spread, write_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import has_test_split, split_rule
@@ -48,7 +48,6 @@ from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, make_grid
 from splitnerf.render.seen import Cameras
 from splitnerf.run_folder import (
-    ORIGIN,
     asset_name,
     check_results,
     check_run,
@@ -340,14 +339,19 @@ def export_run(
         raise InputError(f"{out}: holds what a refinement fitted, which this would replace; give another --out")
     refuse_no_run(run)
     check_results(out, run, overwrite=overwrite)
-    read_origin(run)  # before anything is written
+    read_place(run)  # before anything is written
     own = own_results(out, run)
     if own and placing.moves:
         raise InputError(
             f"{out}: the run's own asset stands where the data are; for --pivot, --scale and --height give another --out"
         )
     anew = any(size is not None for size in (n_faces, texture_size, resolution))
-    asset = read_asset(run / "mesh.glb") if is_refined(run) and not (own or anew) else None
+    refined = is_refined(run) and not own
+    if refined and anew:
+        note(
+            f"another size is of what was trained, without the refinement; `splitnerf refine {out}` fits it to the photos"
+        )
+    asset = read_asset(run / "mesh.glb") if refined and not anew else None
     if asset is None:
         model, _, content = load_run(run)
     with locked(out):
@@ -372,22 +376,9 @@ def export_run(
     return exported
 
 
-def read_origin(run: Path) -> np.ndarray:
-    """[3] where the data's origin is in the run's files; 0 without a file. Raises InputError where the file is damaged."""
-    if not (run / ORIGIN).is_file():
-        return np.zeros(3)
-    try:
-        origin = np.array(read_json(run / ORIGIN, "origin")["origin"], np.float64)
-    except (ValueError, TypeError, KeyError, OverflowError):
-        origin = np.zeros(0)
-    if origin.shape != (3,) or not np.isfinite(origin).all():
-        raise InputError(f"{run / ORIGIN}: does not hold three numbers as 'origin'; repair it")
-    return origin
-
-
 def write_origin(out: Path, run: Path, exported: Exported) -> None:
     """Writes where the data's world is in the files of an export, if it is not as they are."""
-    known = read_origin(run)
+    known, _ = read_place(run) or (0, 1)
     origin = known + exported.origin
     meaning = "divide positions by the scale and add the origin to get those of the data"
     if origin.any() or exported.scale != 1:

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 from splitnerf.config import Config
+from splitnerf.data.asset import ORIGIN
 from splitnerf.data.dataset import EXPOSURES, Dataset
 from splitnerf.data.frames import layout_of, refuse_data, run_in
 from splitnerf.data.json_files import read_json, write_json
@@ -18,7 +19,6 @@ from splitnerf.plugins import installed
 from splitnerf.refinement.refine import RECORD, STATE, TRAINED
 from splitnerf.training.metrics import METRICS, PREVIEWS
 
-ORIGIN = "origin.json"  # where the data's origin is, of runs whose data have it too far away for float32
 DATA = "data.json"  # where the photos of the run are
 ASSET_FILES = ("mesh.glb", "environment.exr", "environment.hdr")
 REFINED = "refined"  # the folder in a run of what `refine` made of it
@@ -70,11 +70,13 @@ def refuse_no_run(run: Path) -> None:
 
 
 def check_results(out: Path, run: Path, *, overwrite: bool) -> None:
-    """Checks that results of a run can be written into a folder; its own folders hold nothing else. Raises InputError
-    where they would replace a data set, what belongs to another run or, unless ``overwrite``, other files."""
+    """Checks that results of a run can be written into a folder. Raises InputError where they would replace a data set,
+    what belongs to another run or, unless ``overwrite``, files that the run's training did not write."""
     refuse_data(out)
     if own_results(out, run):
-        return refuse_links(run)
+        refuse_links(run)
+        if out.resolve() != (run / REFINED).resolve():
+            return
     if (out / "checkpoint.pt").exists():
         raise InputError(f"{out}: holds another run, whose results would be replaced; give another --out")
     present = [name for name in (*RUN_FILES, *EXPORTED) if (out / name).exists()]

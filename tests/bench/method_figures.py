@@ -101,7 +101,7 @@ def levels(size: int = 160) -> plt.Figure:
 
 def light(height: int = 48) -> plt.Figure:
     """g(w, rho) of the demo's sky as panoramas."""
-    sky = torch.from_numpy(build_environment(96, 192)).double()
+    sky = torch.from_numpy(build_environment(96)).double()
     around, areas = (
         torch.from_numpy(x.copy()).reshape(len(sky) * 2 * len(sky), -1) for x in directions_of_texels(len(sky))
     )

@@ -332,6 +332,23 @@ def test_refine_starts_from_what_was_trained_and_can_be_interrupted(run, data, t
     assert main([*command, "--resume"]) == DONE
     assert bytes_of(run / "refined", "mesh.glb", "environment.exr") == bytes_of(run, "mesh.glb", "environment.exr")
     assert not (run / "refined" / "refinement.pt").exists()
+    for again in (command, [*command, "--resume"]):  # it may have taken an hour
+        assert main(again) == BAD_INPUT and "would be replaced" in capsys.readouterr().err
+    assert main([*command[:-1], "1", "--overwrite"]) == DONE
+
+
+def test_an_asset_that_was_placed_elsewhere_is_not_compared_with_the_photos(run, data, tmp_path, capsys):
+    placed = tmp_path / "placed"
+    assert main(["export", str(run), "--out", str(placed), "--formats", "glb", "--pivot", "foot"]) == DONE
+    for words in (["evaluate", str(placed / "mesh.glb")], ["refine", str(placed)]):
+        assert main([*words, "--data", str(data)]) == BAD_INPUT
+        assert "the asset stands elsewhere than the photos" in capsys.readouterr().err
+
+
+def test_a_size_is_of_what_was_trained(run, tmp_path, capsys):
+    small = ["--faces", "200", "--texture-size", "32", "--formats", "glb"]
+    assert main(["export", str(run), "--out", str(tmp_path), *small]) == DONE
+    assert "of what was trained, without the refinement" in capsys.readouterr().err
 
 
 class Clock:

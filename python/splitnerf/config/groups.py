@@ -84,7 +84,7 @@ class SurfaceSettings:
         at_most=1024,
     )
     log2_table_size: int = setting(
-        16, "binary logarithm of the entries of a level's hash table", at_least=1, at_most=24
+        17, "binary logarithm of the entries of a level's hash table", at_least=1, at_most=24
     )
     table_dtype: str = setting(
         "float32",

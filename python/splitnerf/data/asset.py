@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+
+from splitnerf.data.json_files import read_json
+from splitnerf.errors import InputError
+
+ORIGIN = "origin.json"  # beside assets that are not where the data have them
 
 
 @dataclass
@@ -62,6 +69,31 @@ class Asset:
     uv: np.ndarray | None = None
     tangents: np.ndarray | None = None
     colors: np.ndarray | None = None
+
+
+def read_place(folder: Path) -> tuple[np.ndarray, float] | None:
+    """The point [3] of the data that is the origin of a folder's assets, and the assets' units for one of the data's; None
+    where no file says it. Raises InputError where the file is damaged."""
+    if not (folder / ORIGIN).is_file():
+        return None
+    try:
+        content = read_json(folder / ORIGIN, "origin")
+        origin, scale = np.array(content["origin"], np.float64), float(content.get("scale", 1.0))
+    except (ValueError, TypeError, KeyError, OverflowError):
+        origin, scale = np.zeros(0), 1.0
+    if origin.shape != (3,) or not np.isfinite(origin).all() or not 0 < scale < math.inf:
+        raise InputError(f"{folder / ORIGIN}: does not hold three numbers as 'origin', and 'scale' above 0; repair it")
+    return origin, scale
+
+
+def check_place(folder: Path, origin: np.ndarray) -> None:
+    """Raises InputError where the assets of a folder do not stand in the frame of data whose origin is a point [3] of their
+    files, as `export` can place them elsewhere."""
+    place, scale = read_place(folder) or (origin, 1.0)
+    if scale != 1 or not np.array_equal(place, origin):
+        raise InputError(
+            f"{folder / ORIGIN}: the asset stands elsewhere than the photos; export one without --pivot, --scale and --height"
+        )
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
-from splitnerf.data.asset import Asset, unit
+from splitnerf.data.asset import Asset, check_place, unit
 from splitnerf.data.dataset import Dataset, load_dataset, spread
 from splitnerf.data.environment import read_environment, turn_environment
 from splitnerf.data.frames import has_test_split
@@ -184,6 +184,7 @@ def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None 
     split = "test" if has_test_split(data, protocol.reading) else "train"
     views, maps = choose_views(load_dataset(data, split, protocol.downscale, protocol.reading), protocol)
     env = environment_beside(path) if env is None else env
+    check_place(path.parent, views.origin)
     return score_asset(asset, None if env is None else read_environment(env), views, maps, protocol.spp)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.asset import Asset, vertex_tangents
+from splitnerf.data.asset import Asset, check_place, vertex_tangents
 from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, with_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
@@ -293,11 +293,13 @@ def refine_run(
     resume: bool = False,
     reading: Reading = Reading(),
 ) -> Refined | None:
-    """Refines what training exported into a run; see :func:`refine_folder`."""
+    """Refines what training exported into a run, or another asset that stands where its photos are; see
+    :func:`refine_folder`."""
     source = source_of(run)
     with locked(out):
         read_source(source)
         dataset = with_exposures(load_dataset(data, "train", downscale, reading), run)
+        check_place(source, dataset.origin)
         try:
             refined = refine_folder(source, dataset, out, settings, resume=resume)
         except InputError as error:

@@ -16,6 +16,7 @@ import trimesh
 from splitnerf.data.environment import read_environment
 from splitnerf.errors import note
 from splitnerf.fields import LightPyramid
+from splitnerf.relight.studio import studio_light
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -31,30 +32,11 @@ def data_folder() -> Path:
 
 
 def lights() -> dict[str, np.ndarray]:
-    """Maps [h, 2h, 3] by name: measured ones if the data folder has them, else a procedural sky without and with a
-    sun."""
+    """Maps [h, 2h, 3] by name: measured ones if the data folder has them, else skies without and with a sun."""
     files = {name: data_folder() / "hdri" / file for name, file in MEASURED.items()}
     if all(path.is_file() for path in files.values()):
         return {name: read_environment(path) for name, path in files.items()}
-    return {"procedural sky": procedural_sky(256, 0.0), "procedural sun": procedural_sky(256, 300.0)}
-
-
-def procedural_sky(height: int, sun: float) -> np.ndarray:
-    """A blue gradient over brown ground, two soft boxes, and a sun of 2 degrees with `sun` times the zenith's
-    radiance."""
-    polar = (np.arange(height) + 0.5) / height * np.pi
-    azimuth = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
-    sine = np.sin(polar)[:, None]
-    d = np.broadcast_arrays(sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(polar)[:, None])
-    d = np.stack(d, axis=-1)
-    up = d[..., 2:]
-    sky = np.where(up > 0, [0.4, 0.6, 1.0] * (0.5 + up), np.array([0.3, 0.25, 0.2]) * (1 + 0.5 * up))
-    for axis, width, level in (([1, 0, 0.3], 0.25, 6.0), ([-0.5, -0.8, 0.4], 0.15, 12.0)):
-        cosine = d @ (np.array(axis) / np.linalg.norm(axis))
-        sky += level / (1.0 + np.exp((np.arccos(np.clip(cosine, -1, 1)) - width) / 0.02))[..., None]
-    towards = np.array([0.3, 0.7, 0.65]) / np.linalg.norm([0.3, 0.7, 0.65])
-    sky[d @ towards > math.cos(math.radians(1.0))] += sun
-    return sky.astype(np.float32)
+    return {"procedural sky": studio_light("overcast"), "procedural sun": studio_light("sunny")}
 
 
 class MapLight:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from splitnerf.data.environment import directions_of_texels
 from splitnerf.relight.studio import direction, smoothstep, soft_box
 
 from splitnerf_tools.synth.orbits import orbit, spiral
@@ -80,15 +81,13 @@ def build_scene() -> DemoScene:
     )
 
 
-def build_environment(height: int = 128, width: int = 256) -> np.ndarray:
+def build_environment(height: int = 128) -> np.ndarray:
     """Builds the light: a blue sky, a softened sun, warm ground and two soft boxes.
 
     Returns:
-        [height, width, 3] float32 linear radiance, equirectangular (the centre column looks along +x).
+        [height, 2 height, 3] float32 linear radiance, equirectangular (the centre column looks along +x).
     """
-    u, v = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
-    phi, theta = 2 * np.pi * (0.5 - u)[None, :], np.pi * v[:, None]
-    d = np.stack(np.broadcast_arrays(np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)), axis=-1)
+    d, _ = directions_of_texels(height)
     up = d[..., 2:]
 
     zenith, horizon, ground = np.array([0.14, 0.25, 0.52]), np.array([0.50, 0.53, 0.57]), np.array([0.17, 0.12, 0.08])

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from splitnerf.data.asset import check_place
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.gltf import read_asset
@@ -87,6 +88,7 @@ def score_published(target: Path, data: Path, name: str, options: Options, env: 
         raise InputError(f"{path}: no such asset; train the run to its end, or export it")
     env = environment_beside(path) if env is None else env
     _, origin = read_frames(data, "train", Reading("all"))
+    check_place(path.parent, origin)
     delivered = Delivered(read_asset(path), None if env is None else read_environment(env), origin, options.spp)
     missing = ""
     if any("lpips" in key for key, _, _ in protocol.columns):
