@@ -1,6 +1,5 @@
 """Damaged and hostile files in one table: the damage to a good one, and the line that names it. No crash, little memory."""
 
-import json
 import shutil
 import struct
 import zlib
@@ -28,7 +27,6 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import encode_png, read_image, write_image
 from splitnerf.data.truth import load_view_truths, read_mesh
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import stanford_orb
 
 ENDLESS = 10**400
 DOWN = np.arange(SIZE)
@@ -252,23 +250,6 @@ NEUS = {
 }
 
 
-def write_capture(root: Path) -> None:
-    """A capture of Stanford-ORB whose one relit photo is in another capture's light."""
-    for name in ("a", "x"):
-        write_image(root / name / "test/0000.exr", np.ones((8, 8, 3), np.float32))
-    entry = {"scene_name": "x", "file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
-    (root / "a/transforms_novel.json").write_text(json.dumps({"camera_angle_x": 0.7, "frames": [entry]}))
-
-
-STANFORD_ORB = {
-    f"scene {name!r}": (
-        meta(lambda m, name=name: m["frames"][0].update(scene_name=name), "a/transforms_novel.json"),
-        "'scene_name' of frame 0 is no folder's name",
-    )
-    for name in ("", ".", "..", "a/b", "/a", "a\\b", "a\0", 7, None)
-} | {"missing photo": (lambda root: (root / "x/test/0000.exr").unlink(), "0000: no such image")}
-
-
 def png(width: int, height: int) -> bytes:
     """A PNG that claims a size and holds next to nothing."""
     parts = (b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0), b"IDAT" + zlib.compress(b""), b"IEND")
@@ -464,7 +445,6 @@ FORMS = {  # what writes a good folder, what reads it or the path that the damag
     "COLMAP, binary": (lambda root: write_colmap(root, binary=True), LOADED, COLMAP | BINARY),
     "COLMAP, text": (lambda root: write_colmap(root, binary=False), LOADED, COLMAP),
     "NeuS": (write_neus, LOADED, NEUS),
-    "Stanford-ORB": (write_capture, lambda root, _: stanford_orb.relit(root / "a"), STANFORD_ORB),
     "image": (write_images, of_file(read_image), IMAGES),
     "map": (Path.exists, of_file(read_environment), MAPS),
     "mesh": (Path.exists, of_file(read_mesh), MESHES),

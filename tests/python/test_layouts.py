@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from blender_data import SIZE, edit, make_blender, set_pose, sphere_alpha
+from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, write_colmap, write_neus, write_transforms
 from splitnerf import errors
 from splitnerf.cli import BAD_INPUT, DONE
@@ -309,6 +309,22 @@ def test_masks_are_paired_by_names_and_numbers(tmp_path, capsys):
 
 STEPS = ("--steps", "2")
 EAST = np.eye(4, k=3)  # a pose's step along x
+
+
+def test_a_capture_of_stanford_orb_has_its_masks_beside_its_photos(tmp_path):
+    """And radiance above 1."""
+    pose = sphere_poses()[0]
+    for split, level in (("train", 3.0), ("test", 0.5)):
+        write_image(tmp_path / split / "0000.exr", np.full((SIZE, SIZE, 3), level, np.float32))
+        write_image(tmp_path / f"{split}_mask/0000.png", sphere_alpha(pose, CENTRE, RADIUS))
+        frames = [{"file_path": f"{split}/0000", "transform_matrix": pose.tolist()}]
+        content = {"camera_angle_x": ANGLE, "frames": frames}
+        (tmp_path / f"transforms_{split}.json").write_text(json.dumps(content))
+    train, test = (load_dataset(tmp_path, split) for split in ("train", "test"))
+    assert len(train) == len(test) == 1 and np.array_equal(
+        train.images[0, ..., 3] > 0.5, sphere_alpha(pose, CENTRE, RADIUS) > 0.5
+    )
+    assert train.images[0, SIZE // 2, SIZE // 2, :3] / train.exposures[0] == pytest.approx(3.0, rel=1e-2)
 
 
 def n_views(path) -> int:

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, patches, write_object, write_set
-from scipy.spatial.transform import Rotation
 from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import load_dataset
-from splitnerf.data.environment import directions_of_texels, turn_environment
+from splitnerf.data.environment import turn_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.images import read_radiance, write_image
-from splitnerf.data.layouts import neus, stanford_orb, transforms, view_folders
+from splitnerf.data.layouts import neus, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import load_photo
@@ -23,14 +21,11 @@ from splitnerf.data.reading import Reading
 from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
-from splitnerf.evaluate.published import stanford_orb as orb_protocol
 from splitnerf.evaluate.published.scoring import table, table_of_lights
-from splitnerf.evaluate.published.stanford_orb import read_lit_photo
 from splitnerf.evaluate.published.views import relit_views
 from tiny_runs import command
 
 SETS = {  # the module that reads it, and whether it has photos in other lights
-    "stanford-orb": (stanford_orb, True),
     "nerfactor": (view_folders, True),
     "tensoir": (view_folders, True),
     "shiny": (transforms, False),
@@ -47,8 +42,8 @@ def written(request, tmp_path_factory) -> tuple[str, Written]:
 
 def fits(frame: Frame, rendered: dict[str, np.ndarray]) -> float:
     """PSNR in dB of a rendering and a photo, to the power of 1 / 2.2, on pixels in the mask that are not clipped."""
-    photo, mask = read_lit_photo(frame)
-    known = (mask > 0.99) & (photo * frame.exposure < 0.95).all(axis=-1)
+    rgba = load_photo(frame, 1, "object").rgba
+    photo, known = rgba[..., :3], (rgba[..., 3] > 0.99) & (rgba[..., :3] < 0.95).all(axis=-1)
     return psnr(*(image[known].clip(0, 1) ** (1 / 2.2) for image in (rendered["radiance"], photo)))
 
 
@@ -94,13 +89,11 @@ def test_the_truth_from_each_camera_looks_like_the_photo(written):
 def test_the_light_of_each_relit_photo_makes_it(written):
     """And not the light mirrored or turned by a quarter, in the world or in its own axes."""
     name, scene = written
-    layout, relights = SETS[name]
-    if not relights:
+    if not SETS[name][1]:
         return
-    maps = map_files(scene.root, prefixed=True) if layout is view_folders else {}
-    views = relit_views(scene.root, maps) if maps else orb_protocol.relit(scene.root)
+    views = relit_views(scene.root, map_files(scene.root, prefixed=True))
     assert len(views) == TEST * len(RELIT)
-    poses = np.repeat(scene.test, len(RELIT), axis=0) if maps else np.tile(scene.test, (3, 1, 1))
+    poses = np.repeat(scene.test, len(RELIT), axis=0)
     worst = 33
     for view, pose in list(zip(views, poses))[:: 3 if len(views) > 4 else 1]:
         light = view.radiance()
@@ -116,34 +109,6 @@ def test_a_trainer_reads_it(written):
     seen = TRAIN + TEST - 1 if SETS[name][0].splits(scene.root) is None else TRAIN
     assert len(data) == seen and data.height == SIZE
     assert 0.1 < (data.images[..., 3] > 0.5).mean() < 0.6
-    if name == "stanford-orb":  # radiance above 1 is kept
-        assert (data.exposures < 1).any() and (data.images[..., :3].max() > 1.05)
-
-
-# ---- what the sets' documents say, without any constant or function that writer and reader share ----
-
-
-@pytest.mark.parametrize(
-    ("row", "column", "axis"), [(8, 16, (0, 0, -1)), (8, 24, (1, 0, 0)), (8, 8, (-1, 0, 0)), (0, 3, (0, 1, 0))]
-)
-def test_the_light_of_stanford_orb_is_in_the_camera_axes(tmp_path, row, column, axis):
-    """The centre of the map is what the camera looks at, a quarter to the right what is to its right, the top row up."""
-    root = tmp_path / "blender_HDR/cup_scene001"
-    (root / "train_mask").mkdir(parents=True)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec([0.4, 2.0, -0.7]).as_matrix(), (0.1, 0.2, 0.3)
-    frame = {"scene_name": "cup_scene004", "file_path": "test/0003"}
-    frame |= {"camera_angle_x": 0.4, "transform_matrix": pose.tolist()}
-    for name in ("train", "novel"):
-        (root / f"transforms_{name}.json").write_text(json.dumps({"frames": [frame]}))
-    write_image(root.with_name("cup_scene004") / "test/0003.exr", np.ones((8, 8, 3), np.float32))
-    light = np.zeros((16, 32, 3), np.float32)
-    light[row if row == 0 else slice(row - 1, row + 1), slice(None) if row == 0 else slice(column - 1, column + 1)] = 1
-    write_image(tmp_path / "ground_truth/cup_scene004/env_map/0003.exr", light)
-    radiance = orb_protocol.relit(root)[0].radiance()[..., 0]
-    directions, areas = directions_of_texels(16)
-    mean = (directions * (radiance * areas)[..., None]).sum(axis=(0, 1))
-    assert mean / np.linalg.norm(mean) == pytest.approx(pose[:3, :3] @ axis, abs=0.03)
 
 
 def test_radiance_a_little_below_0_is_noise(tmp_path):
@@ -172,33 +137,17 @@ def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
 
 
 BEST = {  # layout: what the truth, path traced, must score at least, by key
-    "stanford-orb": {"psnr_h": 25, "psnr_l": 32, "view_psnr_l": 32},
     "tensoir": {"psnr": 30, "albedo_psnr": 30, "view_psnr": 30},
     "nerfactor": {"psnr": 30, "albedo_psnr": 30, "view_psnr": 30},
     "shiny": {"view_psnr": 30},
 }
-ERRORS = {
-    "stanford-orb": {"normals": 0.02, "chamfer": 0.5},
-    "tensoir": {"normals": 3},
-    "shiny": {"normals": 4},
-    "nerfactor": {"normals": 3},
-}
+ERRORS = {"tensoir": {"normals": 3}, "shiny": {"normals": 4}, "nerfactor": {"normals": 3}}
 
 
 def complete(layout: str, scene) -> None:
     """Writes the truth that synth does not write, and gives views the numbers that the protocol takes."""
-    root, mesh = scene.root, scene.renderer.asset
-    if layout == "stanford-orb":
-        truth = root.parents[1] / "ground_truth" / root.name
-        for i, pose in enumerate(scene.test):
-            normals = scene.render(scene.lights["studio"], pose)["normal"] @ pose[:3, :3]
-            (truth / "surface_normal").mkdir(exist_ok=True, parents=True)
-            np.save(truth / f"surface_normal/{i:04d}.npy", normals)
-        (truth / "mesh_blender").mkdir()
-        trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).export(truth / "mesh_blender/mesh.obj")
-    if (
-        layout == "nerfactor"
-    ):  # of its 200 test views two that count, and two validation views, of which one has the factor
+    root = scene.root
+    if layout == "nerfactor":  # of 200 test views two that count, and two validation views, of which one has the factor
         for i in range(2):
             shutil.copytree(root / f"test_{i:03d}", root / f"val_{i:03d}")
         (root / "val_001/albedo.png").unlink()
@@ -250,4 +199,4 @@ def test_the_truth_scores_nearly_perfectly_by_the_protocol_of_its_set(layout, tm
         assert scores[key] > least, (key, scores)
     for key, most in ERRORS.get(layout, {}).items():
         assert scores[key] < most, (key, scores)
-    assert ("DiffReg-PBIR" in shown) == (layout == "stanford-orb") and f"scores: {tmp_path / 'scores.json'}" in shown
+    assert ("GHPT" in shown) == (layout == "tensoir") and f"scores: {tmp_path / 'scores.json'}" in shown

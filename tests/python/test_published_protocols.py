@@ -5,10 +5,9 @@ import pytest
 import trimesh
 from painted_ball import bare
 from splitnerf.data.asset import Material
-from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import stanford_orb, views
+from splitnerf.evaluate.published import views
 from splitnerf.evaluate.published.common import Delivered, LitView
 from splitnerf.evaluate.published.views import FolderTruth
 
@@ -25,62 +24,6 @@ def box(low: int, high: int) -> np.ndarray:
     mask = np.zeros((SIDE, SIDE))
     mask[low:high, low:high] = 1
     return mask
-
-
-# ---- Stanford-ORB ----
-
-
-def test_orb_forgives_a_factor_per_channel_and_nothing_else():
-    truth, mask = picture(), box(3, 20)
-    scaled = truth * [0.2, 3.0, 1.7]
-    assert stanford_orb.image_psnr(scaled, truth, mask, scaled=True) == (PERFECT, PERFECT)
-    assert max(stanford_orb.image_psnr(scaled, truth, mask, scaled=False)) < 20
-    assert max(stanford_orb.image_psnr(truth**2, truth, mask, scaled=True)) < 30
-
-
-def test_orb_erodes_two_pixels_of_the_mask_but_not_at_the_image_edge():
-    """A mask shifted by one or two pixels with wrong values there does not count, by three it does."""
-    truth, mask = picture(), box(4, 20)
-    for wrong, expected in ((2, True), (3, False)):
-        image = truth.copy()
-        image[4 : 4 + wrong] = 7.0
-        assert (stanford_orb.image_psnr(image, truth, mask, scaled=False)[0] == PERFECT) is expected
-    assert stanford_orb.eroded(np.ones((SIDE, SIDE))).all() and stanford_orb.eroded(mask).sum() == 12 * 12
-    assert not stanford_orb.eroded(0.5 * np.ones((SIDE, SIDE))).any()
-
-
-def test_orb_means_over_the_whole_frame_and_clips():
-    """A difference of d on all k pixels inside gives k / n d^2: PSNR-L in sRGB; PSNR-H after a factor, above 4 nothing counts."""
-    mask = box(2, 22)
-    share = stanford_orb.eroded(mask).mean()
-    truth, image = (np.full((SIDE, SIDE, 3), value) for value in (0.81, 0.49))
-    high, low = stanford_orb.image_psnr(image, truth, mask, scaled=False)
-    difference = linear_to_srgb(np.float64(0.81)) - linear_to_srgb(np.float64(0.49))
-    assert low == pytest.approx(-10 * np.log10(share * difference**2), abs=1e-4)
-    factor = linear_to_srgb(np.float64(0.81)) / 0.81
-    assert high == pytest.approx(-10 * np.log10(share * (factor * 0.32) ** 2), abs=1e-4)
-    brightest = 5 * np.ones((SIDE, SIDE, 3))  # the factor is 1, as the truth clipped to 1 is white
-    assert stanford_orb.image_psnr(9 * brightest, brightest, mask, scaled=False) == (PERFECT, PERFECT)
-    assert stanford_orb.image_psnr(0.5 * brightest, brightest, mask, scaled=False)[0] < 10
-
-
-def test_orb_is_never_worse_than_grey():
-    truth, mask = np.full((SIDE, SIDE, 3), 0.5), np.ones((SIDE, SIDE))
-    low = stanford_orb.image_psnr(np.zeros_like(truth), truth, mask, scaled=False)[1]
-    assert low == pytest.approx(-20 * np.log10(linear_to_srgb(np.float64(0.5)) - 0.5), abs=1e-4)
-
-
-def test_orb_normals_and_chamfer():
-    mask = np.ones((8, 8))
-    straight, turned = np.zeros((8, 8, 3)), np.zeros((8, 8, 3))
-    straight[..., 2], turned[..., 2], turned[..., 0] = 2.0, 1.0, np.sqrt(3)
-    assert stanford_orb.normal_distance(turned, straight, mask) == pytest.approx(0.5)
-    flat = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
-    points = np.asarray(trimesh.sample.sample_surface(flat, 20_000, seed=1)[0]) + [0, 0, 0.1]
-    assert stanford_orb.chamfer(flat, points) == pytest.approx(2e3 * 0.01, rel=0.01)
-
-
-# ---- the others ----
 
 
 def test_nerfactor_scale_is_of_least_squares_on_opaque_pixels():

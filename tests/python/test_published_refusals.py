@@ -8,10 +8,10 @@ import pytest
 import trimesh
 from painted_ball import bare
 from splitnerf.data.asset import Material
-from splitnerf.data.images import linear_to_srgb, write_image
+from splitnerf.data.images import write_image
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.errors import InputError
-from splitnerf.evaluate.published import stanford_orb, views
+from splitnerf.evaluate.published import views
 from splitnerf.evaluate.published.common import Delivered, Options
 
 SIDE = 16
@@ -35,47 +35,6 @@ class Painted:
 
 def picture(seed: int = 0, most: float = 0.9) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.05, most, (SIDE, SIDE, 3)).astype(np.float32)
-
-
-def capture(folder, suffix: str, photo: np.ndarray, novel: str | None = None):
-    """A capture of Stanford-ORB with one test photo, and perhaps one in another capture's light."""
-    frame = {"file_path": "test/0000", "transform_matrix": np.eye(4).tolist()}
-    for split in ("train", "test"):
-        write_image(folder / split / f"0000{suffix}", photo)
-        write_image(folder / f"{split}_mask" / "0000.png", np.ones((SIDE, SIDE)))
-        (folder / f"transforms_{split}.json").write_text(json.dumps({"camera_angle_x": 0.7, "frames": [frame]}))
-    if novel:
-        entry = frame | {"scene_name": novel, "camera_angle_x": 0.7}
-        (folder / "transforms_novel.json").write_text(json.dumps({"frames": [entry]}))
-    return folder
-
-
-def test_orb_reads_lights_where_the_truth_lies(tmp_path):
-    root = capture(tmp_path / "blender_HDR/a_scene001", ".exr", picture(), "a_scene002")
-    capture(tmp_path / "blender_HDR/a_scene002", ".exr", picture())
-    write_image(tmp_path / "elsewhere/a_scene002/env_map/0000.exr", 3 * LIGHT)
-    painted = Painted(picture())
-    stanford_orb.score(painted, root, Options(truth=tmp_path / "elsewhere"))
-    assert painted.lights[0] == pytest.approx(3 * LIGHT, rel=1e-3)
-
-
-def test_orb_takes_linear_photos_for_captures_in_8_bits(tmp_path):
-    """A photo of radiances up to 3 is clipped in blender_LDR; a perfect asset is perfect all the same."""
-    photo = picture(most=3.0)
-    root = capture(tmp_path / "blender_LDR/a_scene001", ".png", linear_to_srgb(photo.clip(0, 1)))
-    scores = stanford_orb.score(Painted(photo), root, Options())
-    assert scores.images[0]["view_psnr_h"] is None and scores.images[0]["view_psnr_l"] > 25
-    assert scores.notes == ["no PSNR-H: blender_HDR with the photos' EXR files is not next to the data's folder"]
-    capture(tmp_path / "blender_HDR/a_scene001", ".exr", photo)
-    scores = stanford_orb.score(Painted(photo), root, Options())
-    assert scores.images[0]["view_psnr_h"] > 50 and scores.notes == []
-
-
-def test_orb_has_no_score_of_an_empty_mask():
-    thin = np.zeros((SIDE, SIDE))
-    thin[4:6] = 1  # nothing is left of it
-    assert stanford_orb.image_psnr(picture(), picture(1), thin, scaled=True) == (None, None)
-    assert stanford_orb.normal_distance(picture(), picture(1), thin) is None
 
 
 def transforms(folder, names: dict[str, list], **changes):

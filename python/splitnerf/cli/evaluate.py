@@ -8,9 +8,9 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, add_reading_options, examples, print_scores, reading_of
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol", "truth")
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol")
 OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
-SETS = ("stanford-orb", "nerfactor", "tensoir", "shiny")
+SETS = ("nerfactor", "tensoir", "shiny")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -50,12 +50,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         choices=SETS,
         metavar="SET",
         help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
-    )
-    add(
-        "--truth",
-        type=Path,
-        metavar="FOLDER",
-        help="for --protocol stanford-orb: the set's ground_truth, if it is elsewhere",
     )
     add(
         "--maps",
@@ -132,8 +126,6 @@ def check_usage(args: argparse.Namespace) -> None:
         raise InputError(
             f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out"
         )
-    if args.truth is not None and not args.protocol:
-        raise InputError("--truth needs --protocol; leave it out")
     if args.data and len(args.data) not in (1, len(args.targets)):
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
@@ -189,7 +181,7 @@ def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
 
     if args.env is not None and not is_asset(target):
         raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
-    options = Options(args.spp, args.maps, args.truth, args.views)
+    options = Options(args.spp, args.maps, args.views)
     content = score_published(target, data, args.protocol, options, args.env)
     path = args.out or published_path(target, args.protocol)
     write_json(path, content)

@@ -8,17 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from splitnerf.data.environment import turn_environment
 from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.data.json_files import write_json
 from splitnerf.data.layouts.frame import OPENCV_AXES
 from splitnerf.data.layouts.neus import CAMERAS, IMAGES, MASKS
-from splitnerf.data.layouts.stanford_orb import HDR, MAP_FROM_CAMERA, NOVEL, ground_truth
 from splitnerf.files import atomic_path
 
 from splitnerf_tools.synth.writer import Maps, SceneWriter, ViewWriter
-
-OBJECT = "asset"  # the name of the object in folders
 
 
 class ShinyWriter(SceneWriter):
@@ -30,49 +25,6 @@ class ShinyWriter(SceneWriter):
         normal = np.concatenate([0.5 * maps["smooth_normal"] + 0.5, maps["alpha"][..., None]], axis=-1)
         write_image(image.with_name(f"{image.stem}_normal.png"), normal)
         write_image(image.with_name(f"{image.stem}_alpha.png"), maps["alpha"])
-
-
-class StanfordOrbWriter(ViewWriter):
-    """Stanford-ORB, see :mod:`splitnerf.data.layouts.stanford_orb`: the training photos are those of the first capture, each
-    relit light is a further capture, and the light of each test photo is in the axes of its camera."""
-
-    def __init__(self, out: Path, camera_angle_x: float):
-        super().__init__(Path(out) / HDR / f"{OBJECT}_scene001", camera_angle_x)
-        self._frames: dict[str, list[dict]] = {"train": [], "test": [], "novel": []}
-        self._lights: dict[str | None, np.ndarray] = {}
-
-    def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        # The set's own file may round it.
-        self._lights[name] = super().light(environment) if name is None else environment
-        return self._lights[name]
-
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
-        self._frames[split].append(self._photo(self.root, split, index, pose, maps))
-        if split == "test":
-            self._map(None, self.root.name, index, pose)
-
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        scene = f"{OBJECT}_scene{[n for n in self._lights if n].index(name) + 2:03d}"
-        entry = self._photo(self.root.with_name(scene), split, index, pose, maps)
-        self._frames["novel"].append(entry | {"scene_name": scene, "camera_angle_x": self.camera_angle_x})
-        self._map(name, scene, index, pose)
-
-    def close(self) -> None:
-        for split in ("train", "test"):
-            content = {"camera_angle_x": self.camera_angle_x, "frames": self._frames[split]}
-            write_json(self.root / f"transforms_{split}.json", content)
-        if self._frames["novel"]:
-            write_json(self.root / NOVEL, {"frames": self._frames["novel"]})
-
-    def _photo(self, folder: Path, split: str, index: int, pose: np.ndarray, maps: Maps) -> dict:
-        write_image(folder / split / f"{index:04d}.exr", maps["radiance"])
-        write_image(folder / f"{split}_mask" / f"{index:04d}.png", mask_of(maps))
-        return {"file_path": f"{split}/{index:04d}", "transform_matrix": pose.tolist()}
-
-    def _map(self, name: str | None, scene: str, index: int, pose: np.ndarray) -> None:
-        turn = MAP_FROM_CAMERA @ pose[:3, :3].T
-        path = ground_truth(self.root, scene) / "env_map" / f"{index:04d}.exr"
-        write_image(path, turn_environment(self._lights[name], turn.T))
 
 
 class NeusWriter(ViewWriter):

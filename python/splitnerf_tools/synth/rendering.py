@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.placement import write_placed_glb
-from splitnerf_tools.synth.published import NeusWriter, ShinyWriter, StanfordOrbWriter
+from splitnerf_tools.synth.published import NeusWriter, ShinyWriter
 from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter, ViewWriter
 
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
@@ -29,11 +29,7 @@ TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
 MAP_SIZE = (256, 512)
 
 
-WRITERS = {name: partial(SceneWriter, layout=name) for name in FULL_TRUTH} | {
-    "shiny": ShinyWriter,
-    "stanford-orb": StanfordOrbWriter,
-    "neus": NeusWriter,
-}
+WRITERS = {name: partial(SceneWriter, layout=name) for name in FULL_TRUTH} | {"shiny": ShinyWriter, "neus": NeusWriter}
 """By the name that `--layout` takes: called with the folder and the horizontal field of view."""
 
 

@@ -78,14 +78,6 @@ def checked_pose(matrix: object, name: str) -> np.ndarray:
     return pose
 
 
-def folder_name(name: object, what: str) -> str:
-    """A name of one folder that a file gives, called `what` in messages. Raises InputError where it is none, or leads
-    elsewhere."""
-    if not isinstance(name, str) or name in ("", ".", "..") or set(name) & set("/\\\0"):
-        raise InputError(f"{what} is no folder's name: {str(name)[:40]!r}; repair it")
-    return name
-
-
 def listed_file(folder: Path, name: str, source: Path) -> Path:
     """The path of a file that `source` lists relative to `folder`, in Windows' form or another Unicode form perhaps; notes once
     where it leads out of the folder."""

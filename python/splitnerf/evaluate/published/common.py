@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.asset import Asset, Material
-from splitnerf.data.environment import MAP_ROWS, read_environment, resize_environment, turn_environment
+from splitnerf.data.environment import MAP_ROWS, read_environment, resize_environment
 from splitnerf.data.images import read_header
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import check_shape, lens_intrinsics
@@ -27,14 +27,12 @@ class Options:
     Attributes:
         spp: Paths a pixel.
         maps: A folder of lights, for sets whose data do not hold them; or None.
-        truth: The folder of the truth, for sets that keep it elsewhere; or None.
         views: Test views, evenly spread, for protocols that take all; None for all.
         distance: The LPIPS distance; None leaves LPIPS out.
     """
 
     spp: int = 128
     maps: Path | None = None
-    truth: Path | None = None
     views: int | None = None
     distance: Distance | None = None
 
@@ -42,9 +40,8 @@ class Options:
         for name, value, most in (("spp", self.spp, MOST_SPP), ("views", self.views, MOST_VIEWS)):
             if value is not None and not 1 <= value <= most:
                 raise InputError(f"--{name} must be at least 1 and at most {most}, got {value}")
-        for name, folder in (("maps", self.maps), ("truth", self.truth)):
-            if folder is not None and not folder.is_dir():
-                raise InputError(f"{folder}: no such folder; give --{name} a folder")
+        if self.maps is not None and not self.maps.is_dir():
+            raise InputError(f"{self.maps}: no such folder; give --maps a folder")
 
 
 @dataclass
@@ -67,14 +64,14 @@ class LitView:
     radiance: Callable[[], np.ndarray]
 
 
-def light_of(path: Path, turn: np.ndarray | None = None) -> Callable[[], np.ndarray]:
-    """Reads a map, at most 512 rows of it, when it is called; `turn` [3, 3] is the rotation from the data's world to the map's."""
+def light_of(path: Path) -> Callable[[], np.ndarray]:
+    """Reads a map, at most 512 rows of it, when it is called."""
 
     def read() -> np.ndarray:
         radiance = read_environment(path)
         if radiance.shape[0] > MAP_ROWS:
             radiance = resize_environment(radiance, MAP_ROWS, 2 * MAP_ROWS)
-        return radiance if turn is None else turn_environment(radiance, turn)
+        return radiance
 
     return read
 
@@ -107,11 +104,6 @@ class Delivered:
         else:
             asset = replace(self.asset, materials=[_scaled(material, scale) for material in self.asset.materials])
         return Delivered(asset, self.environment, self.origin, self.spp)
-
-    @property
-    def vertices(self) -> np.ndarray:
-        """[n, 3] float64 in the data's world."""
-        return self.asset.vertices + self.origin
 
 
 def _scaled(material: Material, scale: np.ndarray) -> Material:

@@ -16,12 +16,11 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json
-from splitnerf.data.layouts import stanford_orb as orb_layout
 from splitnerf.data.layouts import transforms, view_folders
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.evaluate.lpips import find_distance
-from splitnerf.evaluate.published import stanford_orb, views
+from splitnerf.evaluate.published import views
 from splitnerf.evaluate.published.common import Delivered, Options, Scores
 from splitnerf.evaluate.scoring import environment_beside, is_asset
 
@@ -51,17 +50,8 @@ def _similarity(prefix: str, title: str) -> tuple[Column, ...]:
 
 RELIT, ALBEDO, NOVEL = _similarity("", "relit"), _similarity("albedo_", "albedo"), _similarity("view_", "novel")
 NORMALS: Column = ("normals", "normals, degrees", "{:.2f}")
-ORB = (
-    ("psnr_h", "relit, PSNR-H", "{:.2f}"),
-    ("psnr_l", "relit, PSNR-L", "{:.2f}"),
-    ("view_psnr_h", "novel, PSNR-H", "{:.2f}"),
-    ("view_psnr_l", "novel, PSNR-L", "{:.2f}"),
-    ("normals", "normals, 1 - cos", "{:.3f}"),
-    ("chamfer", "chamfer, 2e3", "{:.2f}"),
-)
 LOW = "lights low"  # the paper's own choice: `--lights low` without a protocol
 PROTOCOLS = {
-    "stanford-orb": Protocol(orb_layout, ORB, stanford_orb.score),
     "nerfactor": Protocol(view_folders, (*RELIT, *ALBEDO, NOVEL[0], NORMALS), views.nerfactor),
     "tensoir": Protocol(view_folders, (*RELIT, ALBEDO[0], *NOVEL, NORMALS), views.tensoir),
     "shiny": Protocol(transforms, (*NOVEL, NORMALS), views.shiny),
