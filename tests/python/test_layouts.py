@@ -313,18 +313,19 @@ EAST = np.eye(4, k=3)  # a pose's step along x
 
 def test_a_capture_of_stanford_orb_has_its_masks_beside_its_photos(tmp_path):
     """And radiance above 1."""
-    pose = sphere_poses()[0]
-    for split, level in (("train", 3.0), ("test", 0.5)):
-        write_image(tmp_path / split / "0000.exr", np.full((SIZE, SIZE, 3), level, np.float32))
-        write_image(tmp_path / f"{split}_mask/0000.png", sphere_alpha(pose, CENTRE, RADIUS))
-        frames = [{"file_path": f"{split}/0000", "transform_matrix": pose.tolist()}]
+    poses = sphere_poses()
+    for split, chosen in (("train", poses[:-1]), ("test", poses[-1:])):
+        frames = []
+        for i, pose in enumerate(chosen):
+            write_image(tmp_path / split / f"{i:04d}.exr", np.full((SIZE, SIZE, 3), 3.0, np.float32))
+            write_image(tmp_path / f"{split}_mask/{i:04d}.png", sphere_alpha(pose, CENTRE, RADIUS))
+            frames.append({"file_path": f"{split}/{i:04d}", "transform_matrix": pose.tolist()})
         content = {"camera_angle_x": ANGLE, "frames": frames}
         (tmp_path / f"transforms_{split}.json").write_text(json.dumps(content))
-    train, test = (load_dataset(tmp_path, split) for split in ("train", "test"))
-    assert len(train) == len(test) == 1 and np.array_equal(
-        train.images[0, ..., 3] > 0.5, sphere_alpha(pose, CENTRE, RADIUS) > 0.5
-    )
-    assert train.images[0, SIZE // 2, SIZE // 2, :3] / train.exposures[0] == pytest.approx(3.0, rel=1e-2)
+    train = load_dataset(tmp_path, "train")
+    assert len(train) == len(poses) - 1 and len(load_dataset(tmp_path, "test")) == 1
+    assert np.array_equal(train.images[2, ..., 3] > 0.5, sphere_alpha(poses[2], CENTRE, RADIUS) > 0.5)
+    assert train.images[0, SIZE // 2, SIZE // 2, :3] == pytest.approx(1.055 * 3 ** (1 / 2.4) - 0.055, rel=1e-2)
 
 
 def n_views(path) -> int:

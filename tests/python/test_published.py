@@ -12,11 +12,12 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.frames import layout_of, read_frames
-from splitnerf.data.images import read_radiance, write_image
+from splitnerf.data.images import read_radiance, srgb_to_linear, write_image
 from splitnerf.data.layouts import neus, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import load_photo
+from splitnerf.data.pixels import decoded
 from splitnerf.data.reading import Reading
 from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
@@ -42,8 +43,8 @@ def written(request, tmp_path_factory) -> tuple[str, Written]:
 
 def fits(frame: Frame, rendered: dict[str, np.ndarray]) -> float:
     """PSNR in dB of a rendering and a photo, to the power of 1 / 2.2, on pixels in the mask that are not clipped."""
-    rgba = load_photo(frame, 1, "object").rgba
-    photo, known = rgba[..., :3], (rgba[..., 3] > 0.99) & (rgba[..., :3] < 0.95).all(axis=-1)
+    rgba = decoded(load_photo(frame, 1, "object").rgba)
+    photo, known = srgb_to_linear(rgba[..., :3]), (rgba[..., 3] > 0.99) & (rgba[..., :3] < 0.95).all(axis=-1)
     return psnr(*(image[known].clip(0, 1) ** (1 / 2.2) for image in (rendered["radiance"], photo)))
 
 
