@@ -65,7 +65,7 @@ SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     ),
 }
 KEYS = ("scene", "settings", "minutes", "seed", "images", "threads", "asset")
-COLUMNS = (*KEYS, *SCORES, "seconds", "commit", "date")
+COLUMNS = (*KEYS, *SCORES, "seconds", "kernels", "commit", "date")
 HARD = {  # the light of the photos; three others relight it
     "knot": "lebombo_1k.hdr",
     "rings": "christmas_photo_studio_07_1k.hdr",
@@ -172,7 +172,7 @@ def rows_of(
         print(f"{scene}: no data, left out", file=sys.stderr)
         return []
     run = work / f"runs/{scene.replace(' ', '_')}_{settings}_{minutes:g}_{seed}"
-    commit = provenance(SOURCES)["commit"]  # before, as the sources may change meanwhile
+    facts = provenance(SOURCES)  # before, as the sources may change meanwhile
     limits = ("--max-minutes", minutes, "--overwrite") if minutes else ("--resume", "auto")  # the latter takes hours
     if not splitnerf("train", data, "--out", run, *SETTINGS[settings], *limits, "--seed", seed):
         return []
@@ -189,7 +189,7 @@ def rows_of(
         found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
         if blender:
             found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, work)
-        rows.append(key | scored(found, commit))
+        rows.append(key | scored(found) | {name: facts[name] for name in ("kernels", "commit")})
     if page.pictures:
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
         splitnerf("evaluate", run, "--data", data, "--spp", 64, "--views", 1, "--sheet", sheet)
@@ -201,7 +201,7 @@ def sheet_of(scene: str, work: Path) -> Path:
     return work / f"{scene.replace(' ', '_')}.png"
 
 
-def scored(evaluation: dict, commit: str) -> Row:
+def scored(evaluation: dict) -> Row:
     """The columns of a row that follow from an evaluation; scores without truth are empty."""
     row = {"seconds": f"{evaluation.get('seconds') or 0:.0f}"}
     for column, (keys, digits) in SCORES.items():
@@ -210,7 +210,7 @@ def scored(evaluation: dict, commit: str) -> Row:
             value = value.get(name) if isinstance(value, dict) else None
         row[column] = "" if value is None else f"{value:.{digits}f}"
     now = datetime.datetime.now(datetime.timezone.utc)
-    return row | {"commit": commit, "date": f"{now:%Y-%m-%d %H:%M}"}
+    return row | {"date": f"{now:%Y-%m-%d %H:%M}"}
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -218,15 +218,22 @@ def read_rows(path: Path) -> list[Row]:
     if not path.is_file():
         return []
     with open(path, newline="") as file:
-        rows = csv.DictReader(line for line in file if not line.startswith("#"))
-        return [dict.fromkeys(COLUMNS, "") | {"settings": "cpu"} | row for row in rows]
+        lines = list(file)
+    of_all = {"settings": "cpu"} | dict(
+        line[2:].strip().split(": ", 1) for line in lines if line.startswith("# kernels: ")
+    )
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return [dict.fromkeys(COLUMNS, "") | of_all | row for row in rows]
 
 
 def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     """Writes NAME.csv and NAME.md; the head names the commit of the oldest row, from which the page is stale."""
     page, oldest = PAGES[name], min(rows, key=lambda row: row["date"])
-    facts = provenance(SOURCES, f"make results PAGE={name}") | {"commit": oldest["commit"], "date": oldest["date"][:10]}
-    del facts["threads"]
+    facts = provenance(SOURCES, f"make results PAGE={name}") | {name: oldest[name] for name in ("kernels", "commit")}
+    facts["date"] = oldest["date"][:10]
+    kernels = {row["kernels"] for row in rows}
+    for fact in ("threads", *(("processor", "kernels") if len(kernels) > 1 else ())):
+        del facts[fact]
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
     always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
     shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]
