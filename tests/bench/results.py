@@ -209,8 +209,7 @@ def scored(evaluation: dict) -> Row:
         for name in keys:
             value = value.get(name) if isinstance(value, dict) else None
         row[column] = "" if value is None else f"{value:.{digits}f}"
-    now = datetime.datetime.now(datetime.timezone.utc)
-    return row | {"date": f"{now:%Y-%m-%d %H:%M}"}
+    return row | {"date": f"{datetime.datetime.now(datetime.timezone.utc):%Y-%m-%d %H:%M}"}
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -229,11 +228,10 @@ def read_rows(path: Path) -> list[Row]:
 def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     """Writes NAME.csv and NAME.md; the head names the commit of the oldest row, from which the page is stale."""
     page, oldest = PAGES[name], min(rows, key=lambda row: row["date"])
-    facts = provenance(SOURCES, f"make results PAGE={name}") | {name: oldest[name] for name in ("kernels", "commit")}
+    facts = provenance(SOURCES, f"make results PAGE={name}") | {key: oldest[key] for key in ("kernels", "commit")}
     facts["date"] = oldest["date"][:10]
-    kernels = {row["kernels"] for row in rows}
-    for fact in ("threads", *(("processor", "kernels") if len(kernels) > 1 else ())):
-        del facts[fact]
+    of_rows = ("threads", "processor", "kernels") if len({row["kernels"] for row in rows}) > 1 else ("threads",)
+    facts = {name: value for name, value in facts.items() if name not in of_rows}
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
     always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
     shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]

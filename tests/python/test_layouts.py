@@ -13,6 +13,7 @@ from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import write_image
+from splitnerf.data.json_files import write_json
 from splitnerf.data.layouts import transforms
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
@@ -320,8 +321,7 @@ def test_a_capture_of_stanford_orb_has_its_masks_beside_its_photos(tmp_path):
             write_image(tmp_path / split / f"{i:04d}.exr", np.full((SIZE, SIZE, 3), 3.0, np.float32))
             write_image(tmp_path / f"{split}_mask/{i:04d}.png", sphere_alpha(pose, CENTRE, RADIUS))
             frames.append({"file_path": f"{split}/{i:04d}", "transform_matrix": pose.tolist()})
-        content = {"camera_angle_x": ANGLE, "frames": frames}
-        (tmp_path / f"transforms_{split}.json").write_text(json.dumps(content))
+        write_json(tmp_path / f"transforms_{split}.json", {"camera_angle_x": ANGLE, "frames": frames})
     train = load_dataset(tmp_path, "train")
     assert len(train) == len(poses) - 1 and len(load_dataset(tmp_path, "test")) == 1
     assert np.array_equal(train.images[2, ..., 3] > 0.5, sphere_alpha(poses[2], CENTRE, RADIUS) > 0.5)
