@@ -13,12 +13,13 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import torch
 import trimesh
 
 from splitnerf.config import Config
 from splitnerf.config.settings import UNLIMITED
-from splitnerf.data.asset import ORIGIN, read_place
+from splitnerf.data.asset import read_place, write_place
 from splitnerf.data.dataset import EXPOSURES, Dataset, dataset_fingerprint, load_dataset, spread, write_exposures
 from splitnerf.data.environment import read_environment
 from splitnerf.data.frames import has_test_split, split_rule
@@ -141,9 +142,7 @@ def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> N
     """Writes what a run's folder holds from the start; with ``overwrite`` deletes what a run before left there."""
     if overwrite:
         clear_run(run)
-    if dataset.origin.any():
-        meaning = "add it to positions to get those of the data"
-        write_json(run / ORIGIN, {"origin": dataset.origin.tolist(), "meaning": meaning})
+    write_place(run, dataset.origin)
     write_data_of(run, dataset)
     config.write(run / "config.toml")
 
@@ -372,16 +371,6 @@ def export_run(
                 placing=placing,
             )
         if out.resolve() != run.resolve():
-            write_origin(out, run, exported)
+            known, _ = read_place(run) or (np.zeros(3), 1.0)
+            write_place(out, known + exported.origin, exported.scale)
     return exported
-
-
-def write_origin(out: Path, run: Path, exported: Exported) -> None:
-    """Writes where the data's world is in the files of an export, if it is not as they are."""
-    known, _ = read_place(run) or (0, 1)
-    origin = known + exported.origin
-    meaning = "divide positions by the scale and add the origin to get those of the data"
-    if origin.any() or exported.scale != 1:
-        write_json(out / ORIGIN, {"origin": origin.tolist(), "scale": exported.scale, "meaning": meaning})
-    else:
-        (out / ORIGIN).unlink(missing_ok=True)

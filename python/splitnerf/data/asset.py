@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from splitnerf.data.json_files import read_json
+from splitnerf.data.json_files import read_json, write_json
 from splitnerf.errors import InputError
 
 ORIGIN = "origin.json"  # beside assets that are not where the data have them
@@ -84,6 +84,15 @@ def read_place(folder: Path) -> tuple[np.ndarray, float] | None:
     if origin.shape != (3,) or not np.isfinite(origin).all() or not 0 < scale < math.inf:
         raise InputError(f"{folder / ORIGIN}: does not hold three numbers as 'origin', and 'scale' above 0; repair it")
     return origin, scale
+
+
+def write_place(folder: Path, origin: np.ndarray, scale: float = 1.0) -> None:
+    """Writes what :func:`read_place` reads; no file where nothing differs from the data."""
+    meaning = "divide positions by the scale and add the origin to get those of the data"
+    if origin.any() or scale != 1:
+        write_json(folder / ORIGIN, {"origin": origin.tolist(), "scale": scale, "meaning": meaning})
+    else:
+        (folder / ORIGIN).unlink(missing_ok=True)
 
 
 def check_place(folder: Path, origin: np.ndarray) -> None:
