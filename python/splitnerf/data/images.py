@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 import OpenImageIO as oiio
 import torch
-from PIL import Image, ImageCms
+from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
+from splitnerf.data.colours import ALIKE, REC709, to_srgb
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path, is_file
 
@@ -31,12 +32,9 @@ SOFTWARE = "SplitNeRF"  # what an EXR says of the program that wrote it
 LDR_SUFFIXES = (".png", ".jpg", ".jpeg")
 HDR_SUFFIXES = (".exr", ".hdr")
 SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"RIFF")  # RIFF: WebP
+PICTURES = ("combined", "beauty", "rgba", "rgb", "color", "colour", "image", "composite")  # layers of an EXR
 LARGEST_IMAGE = 1 << 29  # values of an image in memory
 STORED = {"uint8": 8, "uint16": 16}  # bits of the values of files that are read as they are
-SRGB_CODES = (1, 13)  # of primaries and curve, as a PNG's cICP chunk says them
-UNCALIBRATED = 0xFFFF  # of EXIF: another colour space than sRGB
-RAMPS = np.uint8([[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]])  # lines in a cube
-REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # x, y of red, green, blue and white
 VALUES_PER_BYTE = 8 * 1032  # of a file: of a PNG of one colour and one bit a pixel
 
 
@@ -56,8 +54,8 @@ def read_codes(path: str | os.PathLike) -> np.ndarray:
 
 
 def read_colours(path: str | os.PathLike) -> np.ndarray:
-    """Reads a photo like `read_codes`, and brings the colours of 8- and 16-bit files to sRGB from the colour profile or the
-    gamma that the file states. A note says what it states and cannot be used, and that its orientation is not."""
+    """Reads a photo like `read_codes`, and brings the colours of 8- and 16-bit files to sRGB from what the file states, see
+    :func:`splitnerf.data.colours.to_srgb`. A note says that its orientation is not used."""
     path = Path(path)
     with _opened(path, str(path)) as (source, spec):
         stated = {attribute.name: attribute.value for attribute in spec.extra_attribs}
@@ -69,66 +67,8 @@ def read_colours(path: str | os.PathLike) -> np.ndarray:
     if pixels.dtype.kind == "f":
         return pixels
     n_colours = 3 if pixels.shape[2] >= 3 else 1
-    if "ICCProfile" in stated:
-        profile = bytes(np.asarray(stated["ICCProfile"], np.uint8))
-        pixels[..., :n_colours] = from_profile(pixels[..., :n_colours], profile, path)
-    else:
-        if stated.get("Exif:ColorSpace") == UNCALIBRATED or tuple(stated.get("CICP", SRGB_CODES))[:2] != SRGB_CODES:
-            note_other_space(path)
-        gamma = _stated_gamma(str(stated.get("oiio:ColorSpace", "")))
-        pixels[..., :n_colours] = from_gamma(pixels[..., :n_colours], gamma, path)
+    pixels[..., :n_colours] = to_srgb(pixels[..., :n_colours], path)
     return pixels
-
-
-def note_other_space(path: Path) -> None:
-    """Notes that a photo says that it is not sRGB, and has no profile that says what it is."""
-    what = "photos state that their colours are not sRGB (Adobe RGB perhaps), and have no profile"
-    note_once(f"{path.parent}: {what}; their values count as sRGB, convert them", path.name)
-
-
-def from_gamma(codes: np.ndarray, gamma: float, path: Path) -> np.ndarray:
-    """Stored values, bytes or words of any shape, of a photo that are a power of the light, as sRGB; as they are where its gamma
-    is 0 or about sRGB's."""
-    if gamma == 0 or 2.0 < gamma < 2.4:
-        return codes
-    most = np.iinfo(codes.dtype).max
-    curve = linear_to_srgb((np.arange(most + 1, dtype=np.float32) / most) ** np.float32(gamma))
-    note_once(f"{path.parent}: photos state the gamma {gamma:g}; they are brought to sRGB", path.name)
-    return np.rint(most * curve).astype(codes.dtype)[codes]
-
-
-def from_profile(colours: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
-    """Colours [H, W, 1 or 3] of a photo with an ICC profile, as sRGB; as they are, with a note, where that cannot be done."""
-    try:
-        source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-        name = ImageCms.getProfileDescription(source).strip()
-        is_plain = colours.shape[2] == 3 and colours.dtype == np.uint8
-        if not is_plain and re.search("srgb|iec61966", name.lower()):
-            return colours
-        if not is_plain:
-            raise ValueError("only photos of 8 bits and three channels are converted")
-        image, target = Image.fromarray(np.ascontiguousarray(colours)), ImageCms.createProfile("sRGB")
-        intent = ImageCms.Intent.RELATIVE_COLORIMETRIC
-        change = ImageCms.buildTransform(source, target, "RGB", "RGB", intent)
-        ramps = Image.fromarray(np.arange(256, dtype=np.uint8)[:, None, None] * RAMPS)
-        if np.abs(np.subtract(ImageCms.applyTransform(ramps, change), ramps, dtype=int)).max() <= 2:
-            return colours  # the profile is sRGB's, whatever its name
-        converted = ImageCms.applyTransform(image, change)
-    except (ImageCms.PyCMSError, OSError, ValueError) as error:
-        note_once(
-            f"{path.parent}: the colour profile of photos is not used, as {error}; convert them to sRGB", path.name
-        )
-        return colours
-    note_once(f"{path.parent}: photos have the colour profile {name}; they are converted to sRGB", path.name)
-    return np.asarray(converted)
-
-
-def _stated_gamma(space: str) -> float:
-    """The gamma of a colour space's name in OpenImageIO's words; 0 for another curve."""
-    if space.startswith("lin"):
-        return 1.0
-    found = re.match(r"g(\d+)_", space)
-    return float(found[1]) / 10 if found else 0.0
 
 
 class Header(NamedTuple):
@@ -303,7 +243,7 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
         primaries = spec.getattribute("chromaticities")
-        if primaries is not None and np.abs(np.asarray(primaries) - REC709).max() > 0.01:
+        if primaries is not None and np.abs(np.asarray(primaries) - REC709).max() > ALIKE:
             note_once(
                 f"{path.parent}: the chromaticities of images are not used; their values count as sRGB's primaries",
                 path.name,
@@ -325,13 +265,20 @@ def _channels(spec: oiio.ImageSpec) -> list[int]:
 
 
 def _named_channels(spec: oiio.ImageSpec) -> list[int]:
-    """The channels R, G, B and A, or Y and A, by their names, of the first layer that has them; none where the names are others."""
+    """The channels R, G, B and A, or Y and A, by their names, of the layer that is the picture: one without a name, one that is
+    named so, else the first; none where the names are others."""
     names = [name.lower() for name in spec.channelnames]
-    layers = ["", *dict.fromkeys(name[: name.rfind(".") + 1] for name in names)]
-    for layer, colours in product(layers, ("rgb", "y")):
+    layers = dict.fromkeys(name[: name.rfind(".") + 1] for name in names)
+    for layer, colours in product(sorted(layers, key=_rank), ("rgb", "y")):
         if all(layer + colour in names for colour in colours):
             return [names.index(layer + name) for name in f"{colours}a" if layer + name in names]
     return []
+
+
+def _rank(layer: str) -> int:
+    """0 for a layer or a part of an EXR file without a name, 1 for one that is named as pictures are, 2 for others."""
+    last = layer.lower().rstrip(".").rpartition(".")[2]
+    return 0 if not last else 1 if last in PICTURES else 2
 
 
 def _window(source: oiio.ImageInput, spec: oiio.ImageSpec) -> tuple[int, int, int, int]:
@@ -402,12 +349,13 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
 
 
 def _first_picture(source: oiio.ImageInput, path: Path) -> oiio.ImageSpec:
-    """Goes to the first part of an EXR file that holds colours, as the first may be a depth."""
+    """Goes to the part of an EXR file that is the picture: the first of least rank that holds colours."""
     parts = [source.spec()]
     while source.seek_subimage(len(parts), 0):
         parts.append(source.spec())
     source.geterror()  # there is no further part
-    chosen = next((i for i, part in enumerate(parts) if _named_channels(part)), 0)
+    coloured = [i for i, part in enumerate(parts) if _named_channels(part)]
+    chosen = min(coloured, key=lambda i: _rank(str(parts[i].getattribute("oiio:subimagename") or "")), default=0)
     if len(parts) > 1:
         note_once(f"{path.parent}: of images with several parts one is used", f"{path.name}: part {chosen + 1}")
         source.seek_subimage(chosen, 0)

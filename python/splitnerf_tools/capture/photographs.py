@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PIL import ExifTags, Image
-from splitnerf.data.images import UNCALIBRATED, from_gamma, from_profile, note_other_space
+from splitnerf.data.colours import to_srgb
 from splitnerf.errors import InputError, note_once, plain
 from splitnerf.files import atomic_path
 
@@ -97,19 +97,15 @@ def read_upright(path: Path) -> np.ndarray:
         except (rawpy.LibRawError, OSError) as error:
             raise InputError(f"{path}: is no raw photo that can be read ({plain(str(error))}); remove it") from None
     with _open(path) as image:
-        exif, profile = _exif(image, path), image.info.get("icc_profile")
-        turn = TURNS.get(exif.get(ExifTags.Base.Orientation))
-        space = exif.get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace)
+        turn = TURNS.get(_exif(image, path).get(ExifTags.Base.Orientation))
         if image.has_transparency_data:
             note_once(f"{path.parent}: the alpha of photos is not used; give --masks if it is the object's", path.name)
-        if space == UNCALIBRATED and not profile:
-            note_other_space(path)
-        stored = image.info.get("gamma") or math.inf  # the exponent of what a PNG stores
         upright = image if turn is None else image.transpose(turn)
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
-            return np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
-        pixels = np.asarray(upright.convert("RGB"))
-    return from_profile(pixels, profile, path) if profile else from_gamma(pixels, 1 / stored, path)
+            pixels = np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
+        else:
+            pixels = np.asarray(upright.convert("RGB"))
+    return to_srgb(pixels, path)
 
 
 def is_upright(photo: Photograph) -> bool:
