@@ -26,6 +26,7 @@ from splitnerf.errors import InputError
 from splitnerf.fields import LightPyramid
 from splitnerf.files import LOCK, PARTIAL, own_folder
 from splitnerf.training.losses import SeenLight
+from splitnerf_tools.capture import poses
 from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
 from splitnerf_tools.capture.photographs import (
@@ -352,36 +353,54 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
+def as_whole(image: np.ndarray, i: int) -> np.ndarray:
+    return image
+
+
+def as_held(image: np.ndarray, i: int) -> np.ndarray:
+    """A picture as it is, by a camera that was turned, and without its sides, in turn."""
+    side = image.shape[1] // 16
+    return (image, np.rot90(image), image[:, side : image.shape[1] - side])[i % 3]
+
+
 @pytest.mark.parametrize(
-    ("given", "turntable"),
-    [(True, False), (True, True), pytest.param(False, False, marks=pytest.mark.slow)],
-    ids=["around", "turntable", "masks to find"],
+    ("given", "turntable", "held"),
+    [
+        (True, False, as_whole),
+        (True, True, as_whole),
+        (True, False, as_held),
+        pytest.param(False, False, as_whole, marks=pytest.mark.slow),
+    ],
+    ids=["around", "turntable", "three sizes", "masks to find"],
 )
-def test_photos_to_data(tmp_path, capsys, given, turntable):
+def test_photos_to_data(tmp_path, capsys, monkeypatch, given, turntable, held):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""
     n = 12 if given else 20
     truth = write_photos(tmp_path / "photos", n, turntable)
     (tmp_path / "masks").mkdir()
-    for path, pose in zip(sorted((tmp_path / "photos").iterdir()), truth):
-        Image.fromarray(255 * photograph(pose, *CAMERA)[1].astype(np.uint8)).save(
-            tmp_path / "masks" / f"{path.stem}.png"
-        )
+    balls = [held(photograph(pose, *CAMERA)[1], i) for i, pose in enumerate(truth)]
+    for i, (path, ball) in enumerate(zip(sorted((tmp_path / "photos").iterdir()), balls)):
+        name = path.name if held is as_whole else f"1 %20 {path.name}"
+        Image.fromarray(255 * ball.astype(np.uint8)).save(tmp_path / "masks" / name)
+        Image.fromarray(held(np.asarray(Image.open(path)), i)).save(path)
+        path.rename(path.with_name(name))
+    if held is as_held:  # as many photos are matched
+        monkeypatch.setattr(poses, "EXHAUSTIVE", 4), monkeypatch.setattr(poses, "OVERLAP", 2)
     options = (["--masks", str(tmp_path / "masks")] if given else []) + (["--turntable"] if turntable else [])
     assert main(["prepare", str(tmp_path / "photos"), *options, "--out", str(tmp_path / "data")]) == 0
     assert f"{n} of {n} photos" in capsys.readouterr().out
     frames = json.loads((tmp_path / "data" / "transforms.json").read_text())["frames"]
-    poses = np.array([frame["transform_matrix"] for frame in frames])
+    found = np.array([frame["transform_matrix"] for frame in frames])
     # Centres relative to the ball's, in the cameras' distances, are what no similarity changes but a turn about z.
-    angle = np.unwrap(np.arctan2(poses[:, 1, 3], poses[:, 0, 3])) - np.unwrap(
+    angle = np.unwrap(np.arctan2(found[:, 1, 3], found[:, 0, 3])) - np.unwrap(
         np.arctan2(truth[:, 1, 3], truth[:, 0, 3])
     )
     assert np.ptp(angle) < 0.01
-    assert np.allclose(poses[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
+    assert np.allclose(found[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
     assert all(("light_rotation" in frame) == turntable for frame in frames)
     overlap = []
-    for frame, pose in zip(frames, truth):
+    for frame, ball in zip(frames, balls):
         mask = np.asarray(Image.open(tmp_path / "data" / frame["mask_path"])) > 127
-        ball = photograph(pose, *CAMERA)[1]
         overlap.append((mask & ball).sum() / (mask | ball).sum())
     assert np.mean(overlap) > 0.95
     dataset = load_dataset(tmp_path / "data")

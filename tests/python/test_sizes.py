@@ -1,5 +1,6 @@
 """Photos of several sizes in one data set: each is used as it is, and nothing is drawn beside it."""
 
+import io
 import json
 import shutil
 from functools import partial
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 from blender_data import ANGLE, SIZE, make_blender
+from PIL import Image
 from splitnerf.cli import DONE, main
 from splitnerf.config import Config
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
@@ -20,6 +22,7 @@ from splitnerf.render.rays import pixel_rays
 from splitnerf.render.seen import Cameras
 from splitnerf.training.batches import PixelSource, average_with_edges, training_photos
 from splitnerf.training.loop import Training
+from splitnerf_tools.view.assets import ViewedPhotos
 from tiny_runs import tiny
 
 FOCAL = 0.5 * SIZE / np.tan(0.5 * ANGLE)
@@ -125,13 +128,22 @@ def test_training_photos_are_averaged_by_the_smallest(mixed):
 def test_photos_of_two_sizes_become_an_asset(data, tmp_path, capsys):
     """Every part of a run; truth, relit views and pages have the photos' sizes too."""
     mixed, run = cut(data, tmp_path / "data"), tmp_path / "run"
-    assert main(["train", str(mixed), "--out", str(run), "--steps", "30", "--no-refine"]) == DONE
+    assert main(["train", str(mixed), "--out", str(run), "--steps", "30", "--set", "refinement.sweeps=1"]) == DONE
+    assert "refinement, on the photos: colours" in capsys.readouterr().out
     scores = json.loads((run / "evaluation.json").read_text())
     assert scores["novel_view"]["psnr"] > 10 and (run / "mesh.glb").is_file() and (run / "report.html").is_file()
     assert main(["evaluate", str(run), "--data", str(mixed), "--spp", "1"]) == DONE
     assert main(["inspect", str(mixed), "--out", str(tmp_path / "page.html")]) == DONE
     sizes = {f"{view.width}x{view.height}" for view in data_views(mixed, "train", None)}
     assert len(sizes) == 4
+    viewed = ViewedPhotos(mixed)
+    for camera, png, expected in zip(
+        viewed.cameras(), map(viewed.png, range(len(viewed))), data_views(mixed, "train", None)
+    ):
+        assert (
+            (camera["width"], camera["height"]) == Image.open(io.BytesIO(png)).size == (expected.width, expected.height)
+        )
+        assert camera["intrinsics"] == pytest.approx(expected.intrinsics)
     test = load_dataset(mixed, "test")
     for truth, image in zip(load_view_truths(test), test.images):
         assert truth.albedo is None or truth.albedo.shape[:2] == image.shape[:2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 import subprocess
 import sys
@@ -9,7 +10,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
+from urllib.parse import quote, unquote
 
 import numpy as np
 import pycolmap
@@ -20,9 +23,9 @@ from splitnerf_tools.capture.photographs import Photograph
 
 LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
 MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
-BLOCK = 8  # photos whose matches are written at once, so that the progress moves
+BLOCK = 32  # pairs of photos whose matches are written at once, so that the progress moves
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
-OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that
+OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that, and those 2^k further
 COUNT = """
 import contextlib, sqlite3, sys, time
 while True:
@@ -116,7 +119,8 @@ def reconstruct(
 
     Args:
         photos: The photos.
-        images: A folder with the photos, upright, as `GROUP/NAME.png` or `.jpg`; the photos of a group share a lens.
+        images: A folder with the photos, upright, as `GROUP/NAME.png` or `.jpg`, see :func:`file_name`; the photos of a
+            group share a lens.
         folder: A working folder; what is found there of an earlier, interrupted call is used.
         seed: The seed of all random choices.
         report: Called with the step's name and the share done.
@@ -147,16 +151,13 @@ def reconstruct(
                 reader_options=reader,
                 extraction_options=extraction,
             )
-        if n <= EXHAUSTIVE:
-            with _counted(database, "two_view_geometries", n * (n - 1) // 2, lambda share: report("matches", share)):
-                pairing = pycolmap.ExhaustivePairingOptions()
-                pairing.block_size = BLOCK
-                pycolmap.match_exhaustive(database, pairing_options=pairing)
-        else:
-            pairing = pycolmap.SequentialPairingOptions()
-            pairing.overlap, pairing.quadratic_overlap = OVERLAP, True
-            with _counted(database, "two_view_geometries", n * 2 * OVERLAP, lambda share: report("matches", share)):
-                pycolmap.match_sequential(database, pairing_options=pairing)
+        pairs, pairing = photo_pairs(n), pycolmap.ImportedPairingOptions()
+        files = {unquote(file.stem): f"{file.parent.name}/{file.name}" for file in images.glob("*/*")}
+        names = [files[photo.name] for photo in photos]
+        pairing.match_list_path, pairing.block_size = folder / "pairs.txt", BLOCK
+        pairing.match_list_path.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in pairs))
+        with _counted(database, "two_view_geometries", len(pairs), lambda share: report("matches", share)):
+            pycolmap.match_image_pairs(database, pairing_options=pairing)
         placed = iter(range(3, n + 1))
         models = pycolmap.incremental_mapping(
             database, images, folder, pipeline, next_image_callback=lambda: report("cameras", next(placed, n) / n)
@@ -174,6 +175,19 @@ def reconstruct(
             )
         model = _adjusted(model)
     return _taken_out(model, len(models))
+
+
+def file_name(name: str) -> str:
+    """A photo's name without the spaces that end a name in a list of pairs; `unquote` brings them back."""
+    return re.sub(r"[\s%]", lambda found: quote(found[0]), name)
+
+
+def photo_pairs(n: int) -> list[tuple[int, int]]:
+    """The pairs of n photos that are matched, each once: all; of more than EXHAUSTIVE those near in the order of names."""
+    if n <= EXHAUSTIVE:
+        return list(combinations(range(n), 2))
+    steps = [*range(1, OVERLAP + 1), *(2**k for k in range(n.bit_length()) if 2**k > OVERLAP)]
+    return [(i, i + step) for i in range(n) for step in steps if i + step < n]
 
 
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
@@ -212,9 +226,10 @@ def _is_central(camera: pycolmap.Camera) -> bool:
 
 def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
     numbers = {key: i for i, key in enumerate(sorted(model.points3D))}
-    images = sorted((model.images[key] for key in model.reg_image_ids()), key=lambda image: image.name)
+    named = {unquote(Path(model.images[key].name).stem): model.images[key] for key in model.reg_image_ids()}
     poses, lenses, photo_of, point_of, observed = [], [], [], [], []
-    for i, image in enumerate(images):
+    for i, name in enumerate(sorted(named)):
+        image = named[name]
         world_to_camera = np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]])
         poses.append(np.linalg.inv(world_to_camera) @ OPENCV_AXES)
         lenses.append(Lens(image.camera.width, image.camera.height, *map(float, image.camera.params)))
@@ -222,7 +237,7 @@ def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
             point = image.points2D[index]
             photo_of.append(i), point_of.append(numbers[point.point3D_id]), observed.append(point.xy)
     return Reconstruction(
-        [Path(image.name).stem for image in images],
+        sorted(named),
         np.array(poses),
         lenses,
         np.array([model.points3D[key].xyz for key in sorted(model.points3D)]),

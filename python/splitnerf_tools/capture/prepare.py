@@ -30,7 +30,7 @@ from splitnerf_tools.capture.photographs import (
     write_png,
 )
 from splitnerf_tools.capture.photometry import Exposures, find_exposures
-from splitnerf_tools.capture.poses import MIN_PHOTOS, Lens, Reconstruction, reconstruct
+from splitnerf_tools.capture.poses import MIN_PHOTOS, Lens, Reconstruction, file_name, reconstruct
 from splitnerf_tools.capture.surroundings import Shot, surroundings
 from splitnerf_tools.capture.turntable import light_turns, write_moving
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -166,7 +166,7 @@ def _upright_copies(photos: list[Photograph], work: Path) -> Path:
         group.mkdir(parents=True, exist_ok=True)
         suffix = photo.path.suffix.lower()
         as_is = suffix in (".jpg", ".jpeg", ".png") and is_upright(photo)
-        target = group / f"{photo.name}{suffix if as_is else '.png'}"
+        target = group / f"{file_name(photo.name)}{suffix if as_is else '.png'}"
         if target.exists():
             continue
         if as_is:
