@@ -7,6 +7,7 @@
     kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
     time      error against time: half a minute to 30 minutes, two objects, two seeds
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
+    ablation  what each part of the method is worth behind the refinement, by equal steps (splitnerf ablate); hours
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
 Each run becomes rows of PAGE.csv as soon as it ends; the command goes on where it was interrupted. Rows of other minutes or
@@ -64,6 +65,13 @@ SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
         *("--set", "light_queries=2048", "--set", "mesh.resolution=192", "--set", "run.preview_every=1"),
     ),
 }
+STEPS_TAKE = {"paper": 300}  # minutes of the runs that steps end, on two cores
+ABLATED = "boombox", "corset"
+ABLATION = (
+    *("--steps", 6000, "--downscale", 2, "--views", 6, "--spp", 32, "--rows"),
+    "no metal regulariser; no refinement; MLP light; light by the split sum; no indirect light; no neutral light; "
+    "no smoothness of normals; no material entropy; dark metals allowed; no metal loss at all",
+)
 KEYS = ("scene", "settings", "minutes", "seed", "images", "threads", "asset")
 COLUMNS = (*KEYS, *SCORES, "seconds", "kernels", "commit", "date")
 HARD = {  # the light of the photos; three others relight it
@@ -107,6 +115,7 @@ PAGES = {
         "The published method, 1/64 of the samples, all steps", ("boombox",), (("cpu", 30), ("paper", 0)), 200
     ),
 }
+NAMES = *PAGES, "ablation"
 
 
 def splitnerf(*words: object) -> bool:
@@ -256,6 +265,29 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         temporary.write_text("\n".join(lines))
 
 
+def write_ablation(out: Path, work: Path) -> bool:
+    """Runs the ablation and writes its page; whether it succeeded."""
+    scenes, folder, facts = [DATA / "scenes" / name for name in ABLATED], work / "ablation", provenance(SOURCES)
+    if not all(map(Path.is_dir, scenes)) or not splitnerf("ablate", *scenes, "--out", folder, *ABLATION):
+        return False
+    facts |= {"command": "`make results PAGE=ablation`"}
+    (out / "ablation.csv").write_bytes((folder / "ablation.csv").read_bytes())
+    words = " ".join(map(str, ABLATION[:-1]))
+    lines = [
+        "# Ablation",
+        "",
+        header(facts),
+        "",
+        f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included. One run a row, so less",
+        "than 0.3 dB is no difference. [Ablation](../ablation.md) says what the rows mean.",
+        "",
+        (folder / "ablation.md").read_text(),
+    ]
+    with atomic_path(out / "ablation.md") as temporary:
+        temporary.write_text("\n".join(lines))
+    return True
+
+
 def place(row: Row, page: Page) -> tuple:
     """By which the rows of a page are sorted."""
     at = page.scenes.index(row["scene"]) if row["scene"] in page.scenes else len(page.scenes)
@@ -308,7 +340,7 @@ def draw(path: Path, rows: list[Row]) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("pages", nargs="*", metavar="PAGE", help=f"{', '.join(PAGES)} (default: all)")
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help=f"{', '.join(NAMES)} (default: all)")
     parser.add_argument("--work", type=Path, default=ROOT / "runs/results", help="folder of data and runs")
     parser.add_argument("--only", nargs="+", metavar="SCENE", help="these scenes of a page")
     parser.add_argument("--minutes", nargs="+", type=float, help="of each run, in place of the page's")
@@ -317,11 +349,17 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "docs/benchmarks", help="default: docs/benchmarks")
     parser.add_argument("--blender", type=Path, metavar="PYTHON", help="relight by Blender too; needs bpy==5.0.1 there")
     args = parser.parse_args()
-    if unknown := [name for name in args.pages if name not in PAGES]:
-        parser.error(f"unknown page {unknown[0]}; there are {', '.join(PAGES)}")
+    if unknown := [name for name in args.pages if name not in NAMES]:
+        parser.error(f"unknown page {unknown[0]}; there are {', '.join(NAMES)}")
     args.work.mkdir(parents=True, exist_ok=True)
     failed, total = False, 0.0
-    for name in args.pages or PAGES:
+    for name in args.pages or NAMES:
+        if name == "ablation":
+            if args.list:
+                print("ablation: 11 rows of 2 scenes, 5 minutes each")
+            total += 110
+            failed |= not args.list and not write_ablation(args.out, args.work)
+            continue
         page, rows = PAGES[name], read_rows(args.out / f"{name}.csv")
         for seed in range(page.seeds):
             for scene in args.only or page.scenes:
@@ -329,9 +367,10 @@ def main() -> int:
                     key = scene, settings, f"{minutes:g}", str(seed)
                     if not args.again and any(tuple(row[k] for k in KEYS[:4]) == key for row in rows):
                         continue
-                    total += minutes
+                    taken = minutes or STEPS_TAKE[settings]
+                    total += taken
                     if args.list:
-                        print(f"{name}: {scene}, {settings}, {minutes:g} minutes, seed {seed}")
+                        print(f"{name}: {scene}, {settings}, {taken:g} minutes, seed {seed}")
                         continue
                     found = rows_of(scene, settings, minutes, seed, page, args.work, args.blender)
                     failed |= not found
