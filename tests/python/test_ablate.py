@@ -119,6 +119,7 @@ def test_the_mean_over_scenes_is_that_of_rows_and_scores_that_all_have():
 
 def test_it_runs_and_goes_on(data, tmp_path, capsys):
     command = ["ablate", str(data), "--out", str(tmp_path / "out"), "--steps", "6", "--spp", "1", *as_options(SMALL)]
+    command += ["--set", "surface.n_levels=9", "--set", "surface.least_cell=100"]  # a run leaves levels out
     assert main([*command, "--rows", "no mask loss"]) == DONE
     runs = tmp_path / "out" / "tiny"
     assert {p.name for p in runs.iterdir()} == {"full", "no_mask_loss"}
