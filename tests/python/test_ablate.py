@@ -124,6 +124,7 @@ def test_it_runs_and_goes_on(data, tmp_path, capsys):
     runs = tmp_path / "out" / "tiny"
     assert {p.name for p in runs.iterdir()} == {"full", "no_mask_loss"}
     first = (runs / "full" / "checkpoint.pt").stat().st_mtime_ns
+    (runs / "no_mask_loss" / "scores.json").unlink()  # as if it had been interrupted
     assert main([*command, "--rows", "no mask loss; no metal regulariser", "--seeds", "3"]) == DONE
     assert (runs / "full" / "checkpoint.pt").stat().st_mtime_ns == first
     assert (runs / "no_metal_regulariser").is_dir()

@@ -76,9 +76,11 @@ def run_row(plan: AblationPlan, scene: Path, row: Row, seed: int) -> dict:
     run = plan.out / scene.resolve().name / (row.slug if seed == 0 else f"{row.slug}_seed{seed}")
     scores = run / "scores.json"
     stored = run / "config.toml"
-    # a run leaves out levels that are finer than the photos
-    if stored.is_file() and Config.read(stored).replace({"surface.n_levels": config.surface.n_levels}) != config:
-        raise InputError(f"{run}: holds a run with other settings; give another --out")
+    if stored.is_file():
+        begun = Config.read(stored)
+        if begun.replace({"surface.n_levels": config.surface.n_levels}) != config:
+            raise InputError(f"{run}: holds a run with other settings; give another --out")
+        config = begun  # which has fewer levels where the photos ask for fewer
     if not scores.is_file():
         resume = (run / "checkpoint.pt").is_file()
         _, evaluation = reconstruct(
