@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import write_image
+from splitnerf.data.images import read_image, write_image
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.rendering import (
@@ -77,8 +77,8 @@ class Written:
         return self.renderer.render(light, pose, lens, SIZE, SIZE, spp=spp, seed=1 << 30)
 
 
-def write_set(folder: Path, layout: str, relights: bool) -> Written:
-    """Renders the scene in the form of a set."""
+def write_set(folder: Path, layout: str) -> Written:
+    """Renders the scene in the form of a set, `nerfactor` or `shiny`; the latter has no other lights."""
     folder.mkdir(exist_ok=True, parents=True)
     asset_path = write_object(folder)
     lights = {
@@ -88,10 +88,16 @@ def write_set(folder: Path, layout: str, relights: bool) -> Written:
     }
     for name, light in lights.items():
         write_image(folder / f"{name}.exr", light)
-    relit = [folder / f"{name}.exr" for name in RELIT] if relights else []
-    root = synthesise(
-        asset_path, folder / "studio.exr", relit, folder / "data", SynthSettings(SIZE, TRAIN, TEST, SPP, layout)
-    )
+    shiny = layout == "shiny"
+    relit = [] if shiny else [folder / f"{light}.exr" for light in RELIT]
+    settings = SynthSettings(SIZE, TRAIN, TEST, SPP, "blender" if shiny else layout)
+    root = synthesise(asset_path, folder / "studio.exr", relit, folder / "data", settings)
+    for path in (root / "test").glob("*_normal.exr") if shiny else ():
+        pixels = read_image(path)
+        normal, alpha = pixels[..., :3] / np.maximum(pixels[..., 3:], 1e-8), pixels[..., 3:]
+        write_image(path.with_suffix(".png"), np.concatenate([0.5 * normal + 0.5, alpha], axis=-1))
+        write_image(path.with_name(path.name.replace("normal.exr", "alpha.png")), alpha[..., 0])
+        path.unlink()
     original = read_asset(asset_path)
     renderer = AssetRenderer(normalised(original, *unit_sphere(original)))
     train = spiral(TRAIN, CAMERA_DISTANCE, TRAIN_ELEVATIONS)

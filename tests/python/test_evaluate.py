@@ -398,7 +398,7 @@ def test_what_is_missing_is_said_in_a_line(weights, monkeypatch, tmp_path):
 
 def test_a_published_protocol_has_it_or_says_why_not(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("published_scenes.SPP", 4)
-    root = write_set(tmp_path, "shiny", False).root
+    root = write_set(tmp_path, "shiny").root
     asset, light = next(tmp_path.rglob("asset.glb")), root / "light.hdr"
     command = ["evaluate", str(asset), "--data", str(root), "--env", str(light), "--protocol", "shiny"]
     command += ["--spp", "2", "--views", "1", "--out", str(tmp_path / "scores.json")]

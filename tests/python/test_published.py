@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, patches, write_object, write_set
-from splitnerf.cli import BAD_INPUT, DONE, main
+from published_scenes import FOCAL, RELIT, SIZE, TEST, TRAIN, Written, write_set
+from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import turn_environment
 from splitnerf.data.frames import layout_of, read_frames
 from splitnerf.data.images import read_radiance, srgb_to_linear, write_image
-from splitnerf.data.layouts import neus, transforms, view_folders
+from splitnerf.data.layouts import transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.photos import load_photo
@@ -22,23 +22,17 @@ from splitnerf.data.reading import Reading
 from splitnerf.data.truth import map_files
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
-from splitnerf.evaluate.published.scoring import table, table_of_lights
+from splitnerf.evaluate.published.scoring import table_of_lights
 from splitnerf.evaluate.published.views import relit_views
-from tiny_runs import command
 
-SETS = {  # the module that reads it, and whether it has photos in other lights
-    "nerfactor": (view_folders, True),
-    "tensoir": (view_folders, True),
-    "shiny": (transforms, False),
-    "neus": (neus, False),
-}
+SETS = {"nerfactor": view_folders, "shiny": transforms}  # and the modules that read them
 RANDOM = np.random.default_rng(11)
 QUARTER = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
 @pytest.fixture(scope="module", params=SETS)
 def written(request, tmp_path_factory) -> tuple[str, Written]:
-    return request.param, write_set(tmp_path_factory.mktemp(request.param), request.param, SETS[request.param][1])
+    return request.param, write_set(tmp_path_factory.mktemp(request.param), request.param)
 
 
 def fits(frame: Frame, rendered: dict[str, np.ndarray]) -> float:
@@ -54,13 +48,11 @@ def test_published_scores_stand_beside_those_of_their_own_protocol():
     head, ours, *published, source = shown.splitlines()
     assert ours.split() == ["ours", "30.00", "0.950", "-", "26.00", "-", "-"] and "relit, PSNR" in head
     assert published[-1].split()[:3] == ["SplitNeRF", "27.31", "0.941"] and "20 test views" in source
-    assert "SplitNeRF" not in table("nerfactor", {"psnr": 30.0}, "ours")
 
 
 def test_it_is_recognised_and_the_cameras_are_those_that_were_written(written):
     name, scene = written
-    layout, _ = SETS[name]
-    assert layout_of(scene.root) is layout
+    assert layout_of(scene.root) is SETS[name]
     frames = read_frames(scene.root, "train", Reading("all"))[0]
     expected = [*scene.train, *scene.test]
     assert len(frames) == len(expected)
@@ -90,7 +82,7 @@ def test_the_truth_from_each_camera_looks_like_the_photo(written):
 def test_the_light_of_each_relit_photo_makes_it(written):
     """And not the light mirrored or turned by a quarter, in the world or in its own axes."""
     name, scene = written
-    if not SETS[name][1]:
+    if name == "shiny":
         return
     views = relit_views(scene.root, map_files(scene.root, prefixed=True))
     assert len(views) == TEST * len(RELIT)
@@ -107,8 +99,7 @@ def test_the_light_of_each_relit_photo_makes_it(written):
 def test_a_trainer_reads_it(written):
     name, scene = written
     data = load_dataset(scene.root, "train")
-    seen = TRAIN + TEST - 1 if SETS[name][0].splits(scene.root) is None else TRAIN
-    assert len(data) == seen and data.height == SIZE
+    assert len(data) == TRAIN and data.height == SIZE
     assert 0.1 < (data.images[..., 3] > 0.5).mean() < 0.6
 
 
@@ -126,23 +117,14 @@ def test_radiance_a_little_below_0_is_noise(tmp_path):
             load_photo(frame, 1, "object")
 
 
-def test_a_layout_without_other_lights_refuses_them(tmp_path, capsys):
-    write_image(tmp_path / "a.exr", patches())
-    words = write_object(tmp_path), "--light", tmp_path / "a.exr", "--relight", tmp_path / "a.exr", "--layout", "neus"
-    assert command("synth", *words, "--out", tmp_path / "out") == BAD_INPUT
-    assert "the layout neus has no images in other lights" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 # ---- the truth scores nearly perfectly ----
 
 
 BEST = {  # layout: what the truth, path traced, must score at least, by key
-    "tensoir": {"psnr": 30, "albedo_psnr": 30, "view_psnr": 30},
     "nerfactor": {"psnr": 30, "albedo_psnr": 30, "view_psnr": 30},
     "shiny": {"view_psnr": 30},
 }
-ERRORS = {"tensoir": {"normals": 3}, "shiny": {"normals": 4}, "nerfactor": {"normals": 3}}
+ERRORS = {"shiny": 4, "nerfactor": 3}  # degrees of its normals
 
 
 def complete(layout: str, scene) -> None:
@@ -171,22 +153,30 @@ def tinted(path: Path, tint: tuple[float, float, float]) -> Path:
     return out
 
 
-@pytest.mark.parametrize("layout", ["nerfactor", "tensoir"])
-def test_albedos_and_relit_views_are_scored_after_the_albedos_factors(layout, tmp_path):
+def test_albedos_and_relit_views_are_scored_after_the_albedos_factors(tmp_path):
     """Of the truth in other colours, as of a reconstruction whose light is that much off."""
-    scene = write_set(tmp_path / "s", layout, relights=True)
-    complete(layout, scene)
+    scene = write_set(tmp_path / "s", "nerfactor")
+    complete("nerfactor", scene)
     asset = tinted(next((tmp_path / "s").rglob("asset.glb")), (0.5, 0.8, 1.1))
-    options = ["--data", str(scene.root), "--protocol", layout, "--env", str(scene.root / "light.hdr"), "--spp", "96"]
+    options = [
+        "--data",
+        str(scene.root),
+        "--protocol",
+        "nerfactor",
+        "--env",
+        str(scene.root / "light.hdr"),
+        "--spp",
+        "96",
+    ]
     assert main(["evaluate", str(asset), *options, "--out", str(tmp_path / "scores.json")]) == DONE
     scores = json.loads((tmp_path / "scores.json").read_text())["scores"]
     for key in ("psnr", "albedo_psnr"):
-        assert scores[key] > BEST[layout][key], (key, scores)
+        assert scores[key] > BEST["nerfactor"][key], (key, scores)
 
 
 @pytest.mark.parametrize("layout", BEST)
 def test_the_truth_scores_nearly_perfectly_by_the_protocol_of_its_set(layout, tmp_path, capsys):
-    scene = write_set(tmp_path / "s", layout, relights=layout != "shiny")
+    scene = write_set(tmp_path / "s", layout)
     data = scene.root
     complete(layout, scene)
     asset = next(path for path in (tmp_path / "s").rglob("asset.glb"))
@@ -198,6 +188,5 @@ def test_the_truth_scores_nearly_perfectly_by_the_protocol_of_its_set(layout, tm
     scores = json.loads((tmp_path / "scores.json").read_text())["scores"]
     for key, least in BEST[layout].items():
         assert scores[key] > least, (key, scores)
-    for key, most in ERRORS.get(layout, {}).items():
-        assert scores[key] < most, (key, scores)
-    assert ("GHPT" in shown) == (layout == "tensoir") and f"scores: {tmp_path / 'scores.json'}" in shown
+    assert scores["normals"] < ERRORS[layout]
+    assert f"scores: {tmp_path / 'scores.json'}" in shown

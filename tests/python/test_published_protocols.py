@@ -13,7 +13,6 @@ from splitnerf.evaluate.published.views import FolderTruth
 
 SIDE = 24
 RANDOM = np.random.default_rng(5)
-PERFECT = 100.0  # dB
 
 
 def picture(most: float = 0.9) -> np.ndarray:
@@ -42,26 +41,6 @@ def test_nerfactor_takes_four_views_of_the_test():
     assert names == ["test_049", "test_099", "test_149", "test_199"]
     with pytest.raises(InputError, match="none of the test views 49, 99, 149, 199"):
         views.chosen([view(3)], None)
-
-
-def test_tensoir_albedo_is_to_the_power_and_white_outside():
-    alpha = (box(6, 18) > 0).astype(float)
-    truth = FolderTruth(None, alpha, np.full((SIDE, SIDE, 3), 0.36), None)
-    maps = {"albedo": np.full((SIDE, SIDE, 3), 0.18), "alpha": alpha}
-    assert views.albedo_error(maps, truth, np.full(3, 2.0)) == pytest.approx(0, abs=1e-12)
-    bright = {"albedo": np.full((SIDE, SIDE, 3), 0.72), "alpha": alpha}
-    assert views.albedo_error(bright, truth, np.full(3, 0.5)) == pytest.approx(0, abs=1e-12)
-    expected = alpha.mean() * (0.36 ** (1 / 2.2) - 0.18 ** (1 / 2.2)) ** 2
-    assert views.albedo_error(maps, truth, np.ones(3)) == pytest.approx(expected)
-
-
-def test_tensoir_normals_count_the_background_as_equal():
-    alpha = box(0, 12)
-    up, side = (np.broadcast_to(np.array(n, float), (SIDE, SIDE, 3)) for n in ((0, 0, 1), (1, 0, 0)))
-    found = views.whole_normals({"normal": side, "alpha": alpha}, FolderTruth(None, alpha, None, up))
-    assert found == pytest.approx(90 * alpha.mean())
-    nothing = {"normal": side, "alpha": np.zeros_like(alpha)}  # shows the background where the truth points down
-    assert views.whole_normals(nothing, FolderTruth(None, alpha, None, -up)) == pytest.approx(180 * alpha.mean())
 
 
 def test_shiny_normals_are_weighted():

@@ -17,7 +17,7 @@ from splitnerf_tools.commands import synth as synth_command
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise, unit_sphere
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
-from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter
+from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 from tiny_runs import command
 
 SIZE = 24
@@ -59,7 +59,7 @@ def close_images(image, maps):
     assert np.abs(image[seen][:, :3] - np.clip(linear_to_srgb(straight), 0, 1)).max() <= HALF_STEP
 
 
-@pytest.mark.parametrize("layout", FULL_TRUTH)
+@pytest.mark.parametrize("layout", LAYOUTS)
 def test_files_hold_what_was_rendered(files, tmp_path, layout):
     asset = read_asset(files / "balls.glb")
     recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4, layout)
@@ -82,11 +82,10 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
     assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert test.world_poses == pytest.approx(orbit(2, 3.0233467, 30, 20), abs=1e-4)
 
-    truths = load_view_truths(test) + (load_view_truths(train) if layout == "tensoir" else [])
-    for truth, maps in zip(truths, recorder.maps[3:5] + recorder.maps[:3]):
+    for truth, maps in zip(load_view_truths(test), recorder.maps[3:5]):
         solid = maps["alpha"] > 0.92
         assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
-        encoded = linear_to_srgb if layout == "blender" else np.asarray  # the others keep albedo linear
+        encoded = linear_to_srgb if layout == "blender" else np.asarray  # the other one keeps albedo linear
         assert np.abs(encoded(truth.albedo[solid]) - encoded(maps["albedo"][solid])).max() <= HALF_STEP
         unit = maps["smooth_normal"] / np.maximum(np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True), 1e-8)
         assert np.linalg.norm(truth.normal[solid] - unit[solid], axis=-1).max() < np.radians(0.6)
@@ -97,7 +96,7 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
             assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
         else:
             assert truth.roughness is None and truth.metallic is None
-    assert (load_view_truths(train)[0].albedo is None) == (layout != "tensoir")
+    assert load_view_truths(train)[0].albedo is None
 
     assert list(relight_maps(test)) == ["a", "b_1"]
     for k, name in enumerate(relight_maps(test)):

@@ -10,7 +10,7 @@ from splitnerf.errors import InputError
 
 NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol")
 OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
-SETS = ("nerfactor", "tensoir", "shiny")
+SETS = ("nerfactor", "shiny")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -49,7 +49,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "--protocol",
         choices=SETS,
         metavar="SET",
-        help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
+        help=f"score mesh.glb by the rules of a published set, and write RUN/SET.json: {', '.join(SETS)}",
     )
     add(
         "--maps",
@@ -122,10 +122,8 @@ def check_usage(args: argparse.Namespace) -> None:
     if args.protocol and (ruled_out or args.downscale is not None):
         name = (ruled_out or ["downscale"])[0].replace("_", "-")
         raise InputError(f"--{name} cannot be used with --protocol, which has rules of its own; leave it out")
-    if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
-        raise InputError(
-            f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out"
-        )
+    if args.protocol == "nerfactor" and args.views is not None:
+        raise InputError("--views cannot be used with --protocol nerfactor, which chooses its views; leave it out")
     if args.data and len(args.data) not in (1, len(args.targets)):
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
@@ -172,11 +170,10 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
 
 
 def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
-    """Scores one run or file by the protocol of a published set, writes the scores, and prints them with published
-    ones."""
+    """Scores one run or file by the protocol of a published set, writes the scores, and prints them."""
     from splitnerf.data.json_files import write_json
     from splitnerf.evaluate.published.common import Options
-    from splitnerf.evaluate.published.scoring import published_path, score_published, table
+    from splitnerf.evaluate.published.scoring import PROTOCOLS, published_path, score_published, table
     from splitnerf.evaluate.scoring import is_asset
 
     if args.env is not None and not is_asset(target):
@@ -186,11 +183,9 @@ def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
     path = args.out or published_path(target, args.protocol)
     write_json(path, content)
     print(f"{args.protocol}, {len(content['images'])} images, {args.spp} paths a pixel:")
-    print(table(args.protocol, content["scores"], f"{scene_name(target)}, this scene"))
+    print(table(PROTOCOLS[args.protocol].columns, {"method": scene_name(target)} | content["scores"]))
     for note in content["notes"]:
         print(f"note: {note}")
-    if content["published"]["rows"]:
-        print(f"published: {content['published']['source']} ({content['published']['date']})")
     print(f"scores: {path}")
 
 

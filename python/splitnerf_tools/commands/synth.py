@@ -9,7 +9,7 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
-LAYOUTS = ("blender", "nerfactor", "tensoir", "shiny", "neus")
+LAYOUTS = ("blender", "nerfactor")
 SHAPES = ("bowl", "mug", "box", "vase", "shell", "rings", "plinth", "mask")
 MATERIALS = ("matte", "glossy", "metal")
 
@@ -51,8 +51,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         choices=LAYOUTS,
         metavar="SET",
         default="blender",
-        help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}; the first three hold full truth and "
-        "take --relight",
+        help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}",
     )
     parser.add_argument(
         "--turntable",

@@ -1,20 +1,17 @@
-"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in
-:mod:`splitnerf_tools.synth.published`.
+"""Writes rendered views as a dataset with its truth.
 
 Layouts:
     blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
                 (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`.
     nerfactor   a folder per view, `train_000`, `test_000`, with `rgba.png` and `metadata.json`; for test views also
                 `albedo.png`, `normal.png` and `rgba_<map>.png`.
-    tensoir     the same, with truth for the train views too.
 
 In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but
-the albedo of nerfactor and tensoir is linear), normals world space without the normal map.
+the albedo of nerfactor is linear), normals world space without the normal map.
 """
 
 from __future__ import annotations
 
-import abc
 from pathlib import Path
 
 import numpy as np
@@ -25,28 +22,25 @@ from splitnerf.data.layouts import view_folders
 from splitnerf.data.truth import PREFIX, relit_path
 from splitnerf.export.scene import write_mesh_ply
 
-FULL_TRUTH = ("blender", "nerfactor", "tensoir")
+LAYOUTS = ("blender", "nerfactor")
 Maps = dict[str, np.ndarray]
 
 
-class ViewWriter(abc.ABC):
+class SceneWriter:
     """Takes the renderings of one scene; the files that name the views are written last, by `close`.
 
     Args:
-        root: The folder to train on; made where it is missing.
+        root: The dataset's folder; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
-
-    Attributes:
-        relights: Whether the layout has images under other lights.
+        layout: One of `LAYOUTS`.
 
     Raises:
         OSError: A file cannot be written (any method).
     """
 
-    relights = True
-
-    def __init__(self, root: Path, camera_angle_x: float):
-        self.root, self.camera_angle_x = Path(root), camera_angle_x
+    def __init__(self, root: Path, camera_angle_x: float, layout: str = "blender"):
+        self.root, self.camera_angle_x, self.layout = root, camera_angle_x, layout
+        self._views: dict[str, list[tuple[Path, dict]]] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
         """Writes an environment map.
@@ -66,42 +60,17 @@ class ViewWriter(abc.ABC):
         """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""
         write_mesh_ply(self.root / "mesh.ply", trimesh.Trimesh(vertices, triangles, process=False))
 
-    @abc.abstractmethod
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps, light_turn: np.ndarray | None = None) -> None:
         """Writes a photo, and the truth of test views.
 
         Args:
             split: "train" or "test".
             index: Number of the view in its split.
             pose: [4, 4] camera-to-world, OpenGL axes.
-            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; where truth is written also `albedo`,
-                `roughness`, `metallic` and `smooth_normal`.
+            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; for test views also `albedo`, `roughness`,
+                `metallic` and `smooth_normal`.
+            light_turn: [3, 3] that of :class:`splitnerf.data.layouts.frame.Frame`, with layout `blender`.
         """
-
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
-
-    @abc.abstractmethod
-    def close(self) -> None:
-        """Writes the poses, which complete the dataset."""
-
-
-class SceneWriter(ViewWriter):
-    """A writer of a layout with full truth.
-
-    Args:
-        out: The dataset's folder; made where it is missing.
-        camera_angle_x: See :class:`ViewWriter`.
-        layout: One of `FULL_TRUTH`.
-    """
-
-    def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
-        super().__init__(out, camera_angle_x)
-        self.layout = layout
-        self._views: dict[str, list[tuple[Path, dict]]] = {}
-
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps, light_turn: np.ndarray | None = None) -> None:
-        """See :meth:`ViewWriter.view`; `light_turn` [3, 3] is that of :class:`splitnerf.data.layouts.frame.Frame`."""
         image = self._image_path(split, index)
         write_image(image, straight_rgba(maps))
         height, width = maps["alpha"].shape
@@ -112,13 +81,15 @@ class SceneWriter(ViewWriter):
             entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
             entry |= {"imw": width, "imh": height}
         self._views.setdefault(split, []).append((image, entry))
-        if split == "test" or self.layout == "tensoir":
+        if split == "test":
             self._write_truth(image, maps)
 
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        write_image(relit_path(self._image_path(split, index), name), straight_rgba(maps))
+    def relit(self, index: int, name: str, maps: Maps) -> None:
+        """Writes a test view under map `name`."""
+        write_image(relit_path(self._image_path("test", index), name), straight_rgba(maps))
 
     def close(self) -> None:
+        """Writes the poses, which complete the dataset."""
         for split, views in self._views.items():
             if self.layout == "blender":
                 content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +46,10 @@ class Options:
 
 @dataclass
 class Scores:
-    """The numbers of each image by key, with its name; restrictions, for the reader; and numbers of the table that are
-    not the means over the images."""
+    """The numbers of each image by key, with its name; and restrictions, for the reader."""
 
     images: list[dict]
-    notes: list[str] = field(default_factory=list)
-    means: dict[str, float | None] = field(default_factory=dict)
+    notes: list[str]
 
 
 @dataclass(frozen=True)
