@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from published_scenes import part
 from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -22,6 +21,17 @@ from tiny_runs import command
 
 SIZE = 24
 HALF_STEP = 0.5 / 255 + 1e-6
+
+
+def part(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float, offset: tuple) -> trimesh.Trimesh:
+    """A mesh with its material, moved, z up turned to glTF's y up."""
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
+    )
+    vertices = (mesh.vertices + offset)[:, [0, 2, 1]] * [1, 1, -1]
+    normals = np.array(mesh.vertex_normals)[:, [0, 2, 1]] * [1, 1, -1]
+    visual = trimesh.visual.TextureVisuals(material=material)
+    return trimesh.Trimesh(vertices, mesh.faces, vertex_normals=normals, visual=visual, process=False)
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,6 @@ from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import Frame, checked_pose
 from splitnerf.data.lens import read_lens
 from splitnerf.errors import InputError
-from splitnerf.files import is_file
 
 METADATA, PHOTO = "metadata.json", "rgba.png"
 SPLITS = ("train", "test")
@@ -42,11 +41,6 @@ def read(root: Path, split: str | None) -> list[Frame]:
     if not folders:
         raise InputError(f"{root}: has no view folder {split}_000 for the {split} split; add posed images")
     return [_read_view(folder) for folder in folders]
-
-
-def read_others(root: Path, prefix: str) -> list[Frame]:
-    """The views `PREFIX_000` ... of a prefix that is no split, such as `val`, by number; those without a photo left out."""
-    return [_read_view(folder) for folder in _folders(root, prefix) if is_file(folder / PHOTO)]
 
 
 def parse_matrix(text: object) -> object:
