@@ -23,7 +23,7 @@ SIZE = 24
 HALF_STEP = 0.5 / 255 + 1e-6
 
 
-def part(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float, offset: tuple) -> trimesh.Trimesh:
+def piece(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float, offset: tuple) -> trimesh.Trimesh:
     """A mesh with its material, moved, z up turned to glTF's y up."""
     material = trimesh.visual.material.PBRMaterial(
         baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
@@ -38,8 +38,8 @@ def part(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float
 def files(tmp_path_factory):
     """An asset with no symmetry, off the origin, and two maps: one side bright, and a blue one."""
     folder = tmp_path_factory.mktemp("files")
-    ball = part(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
-    small = part(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
+    ball = piece(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
+    small = piece(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
     scene = trimesh.Scene({"ball": ball, "small": small})
     (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
     sunny = np.full((16, 32, 3), 0.05, np.float32)

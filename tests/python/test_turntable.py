@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-import trimesh
 from blender_data import edit, look_at, make_blender
-from painted_ball import lamps, photos, textured
+from painted_ball import lamps, photos
 from scipy.spatial.transform import Rotation
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
@@ -178,10 +177,9 @@ def test_the_truth_explains_photos_of_a_turntable(painted):
     assert known.make_lamp_compact() is None
 
 
-def test_made_data_turn_the_light_with_the_camera(tmp_path):
+def test_made_data_turn_the_light_with_the_camera(ball, tmp_path):
     """A ball of one colour looks alike from all sides of one height, as it does to a camera that does not move."""
-    mesh = trimesh.creation.icosphere(subdivisions=3)
-    write_glb(tmp_path / "ball.glb", textured(mesh.vertices, mesh.faces))
+    write_glb(tmp_path / "ball.glb", ball)
     write_image(tmp_path / "light.hdr", lamps())
     options = ["--size", "24", "--train", "4", "--test", "6", "--spp", "256"]
     words = ["synth", str(tmp_path / "ball.glb"), "--light", str(tmp_path / "light.hdr"), *options]
