@@ -24,7 +24,7 @@ from splitnerf.render.renderer import render_view
 from splitnerf_tools.capture.turntable import light_turns, moving_pixels, reduced, write_moving
 from splitnerf_tools.synth.rendering import turn_to
 from test_views import LENS, POSE, SIZE, ball
-from tiny_runs import SMALL, as_options
+from tiny_runs import SMALL, as_options, refused
 
 
 def about_z(*degrees: float) -> np.ndarray:
@@ -222,6 +222,5 @@ def test_a_run_of_a_turntable_goes_to_its_end(data, tmp_path, capsys):
     assert model.config.shading.method == "split"
     assert main(["evaluate", str(run), "--data", str(turned), "--spp", "1"]) == DONE
     mlp = [*words, "--set", "occlusion.kind=mlp", "--set", "shading.method=split", "--overwrite"]
-    assert main(mlp) == 2
-    assert "photos of a turntable need occlusion.kind" in capsys.readouterr().err
+    assert "photos of a turntable need occlusion.kind" in refused(capsys, *mlp)
     assert json.loads((run / "evaluation.json").read_text())  # the run stays
