@@ -23,7 +23,6 @@ TESTS = {
     "data/gltf/": "test_gltf.py",
     "devices.py": "test_device.py test_doctor.py test_meshes.py test_train.py",
     "evaluate/": "test_evaluate.py test_metrics.py",
-    "evaluate/published/": "test_published.py test_published_protocols.py test_published_refusals.py",
     "export/": "test_export.py test_bake.py test_meshing.py",
     "files.py": "test_files.py test_own_files.py",
     "fields/": "test_heads.py test_scene.py test_shading_model.py",

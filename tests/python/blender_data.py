@@ -19,6 +19,12 @@ def look_at(position, target):
     return pose
 
 
+def directions_of_map(height):
+    """[height, 2 height, 3] unit vectors through a map's texels: u = 0.5 - azimuth / (2 pi), v = polar angle / pi."""
+    polar, azimuth = np.pi * (np.mgrid[:height, : 2 * height] + 0.5) / height
+    return np.stack([-np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1)
+
+
 def sphere_alpha(pose, centre, radius, size=SIZE):
     """Coverage of a sphere seen by a pinhole camera, straight from the quadratic."""
     focal = 0.5 * size / np.tan(0.5 * ANGLE)

@@ -85,8 +85,7 @@ def at_step(monkeypatch) -> Callable[[int, Callable[[], object]], None]:
 @pytest.fixture(scope="session")
 def ball() -> Asset:
     """A ball of one material."""
-    mesh = trimesh.creation.icosphere(subdivisions=3)
-    return textured(mesh.vertices, mesh.faces)
+    return textured(trimesh.creation.icosphere(subdivisions=3))
 
 
 @pytest.fixture(scope="session")

@@ -20,11 +20,11 @@ PHOTO = 40  # pixels
 FOCAL = 60.0
 
 
-def textured(vertices: np.ndarray, faces: np.ndarray, size: int = SIZE) -> Asset:
+def textured(mesh: trimesh.Trimesh, size: int = SIZE) -> Asset:
     """A mesh with smooth normals and plain textures."""
-    normals = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, np.float32)
-    origins, faces, uv = unwrap(vertices.astype(np.float32), faces, size)
-    vertices, normals = vertices[origins].astype(np.float32), normals[origins]
+    normals = np.asarray(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_normals, np.float32)
+    origins, faces, uv = unwrap(np.float32(mesh.vertices), np.asarray(mesh.faces), size)
+    vertices, normals = np.float32(mesh.vertices)[origins], normals[origins]
     material = Material(
         roughness=1.0,
         metallic=1.0,

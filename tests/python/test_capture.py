@@ -16,6 +16,7 @@ import numpy as np
 import pycolmap
 import pytest
 import torch
+from blender_data import directions_of_map
 from PIL import Image
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.data.dataset import load_dataset
@@ -45,6 +46,7 @@ from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_v
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
 from test_files import no_more_than
+from tiny_runs import refused
 
 PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -231,8 +233,8 @@ def test_photos_without_detail_are_told_of(tmp_path, capsys):
     (tmp_path / "photos").mkdir()
     for i in range(5):
         Image.new("RGB", (200, 150), (100 + i, 120, 140)).save(tmp_path / f"photos/{i}.png")
-    assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "data")]) == BAD_INPUT
-    assert "photos: the photos show too little detail; put the object on a pattern" in capsys.readouterr().err
+    error = refused(capsys, "prepare", tmp_path / "photos", "--out", tmp_path / "data")
+    assert "photos: the photos show too little detail; put the object on a pattern" in error
 
 
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])
@@ -257,8 +259,7 @@ def test_sigterm_ends_it_without_a_stack_trace(tmp_path):
 
 def test_other_files_are_not_written_over(tmp_path, capsys):
     (tmp_path / "transforms.json").write_text("{}")
-    assert main(["prepare", str(tmp_path), "--out", str(tmp_path)]) == 2
-    assert "holds other files" in capsys.readouterr().err
+    assert "holds other files" in refused(capsys, "prepare", tmp_path, "--out", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["transforms.json"]
 
 
@@ -416,9 +417,7 @@ def test_surroundings_are_what_the_object_sees():
         photo = np.round(255 * linear_to_srgb(linear.astype(np.float32))).astype(np.uint8)
         shots.append(Shot(photo, ball, pose, Lens(320, 240, 200.0, 200.0, 160.0, 120.0, 0, 0, 0, 0), gain))
     found = surroundings(shots, BALL, TABLE_RADIUS)
-    v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(2 * HEIGHT) + 0.5) / (2 * HEIGHT), indexing="ij")
-    theta, phi = v * np.pi, (0.5 - u) * 2 * np.pi
-    rays = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    rays = directions_of_map(HEIGHT)
     at_table = BALL - BALL[2] / np.minimum(rays[..., 2:], -1e-9) * rays
     radius = np.linalg.norm(at_table[..., :2], axis=-1)
     on_table = (rays[..., 2] < 0) & (radius < TABLE_RADIUS)

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import re
-import sys
 
 import pytest
 from hypothesis import HealthCheck, assume, given
@@ -12,13 +11,9 @@ from hypothesis import strategies as st
 from splitnerf.cli import DONE, main
 from splitnerf.config import FIELDS, GROUPS, SHORT_NAMES, Config, parse_setting, preset, settings_table
 from splitnerf.config.setting import setting
+from splitnerf.config.settings import tomllib
 from splitnerf.errors import InputError
 from splitnerf.training.checkpoint import config_of
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def flat(groups: dict[str, dict]) -> dict[str, object]:

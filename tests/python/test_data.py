@@ -13,9 +13,11 @@ from layout_scenes import CENTRE, LENS, RADIUS, opencv_points, seen_by_pixels, w
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
+from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import Distortion, read_lens, sample_cubic, undistort
 from splitnerf.data.normalisation import transform_points
-from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths
+from splitnerf.data.photos import load_photo
+from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_relit
 from splitnerf.errors import InputError
 from splitnerf.refinement.pixels import covered_pixels
 
@@ -55,6 +57,31 @@ def test_view_folders(tmp_path):
     assert truth.normal[centre, centre] == pytest.approx([0, -0.6, 0.8], abs=0.006)
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and not truth.normal[0, 0].any()
     assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
+    write_image(root / "test_011/rgba_city.png", np.full((SIZE, SIZE, 4), [0.2, 0.4, 0.6, 1]))
+    assert read_relit(test, 1, "city")[centre, centre] == pytest.approx([0.2, 0.4, 0.6, 1], abs=1e-6)
+
+
+def test_normals_of_shiny_blender_are_whole(scene):
+    """Those of NeRF-Blender, without `r_0_alpha.png`, have lost what is negative."""
+    normal = np.array([-0.48, -0.6, 0.64])
+    write_image(scene / "train/r_0_normal.png", np.full((SIZE, SIZE, 3), 0.5 * normal + 0.5))
+    write_image(scene / "train/r_0_alpha.png", np.ones((SIZE, SIZE)))
+    truth = load_view_truths(load_dataset(scene, "train"))[0]
+    centre = SIZE // 2
+    assert truth.normal[centre, centre] == pytest.approx(normal, abs=0.006)
+    assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0]
+
+
+def test_radiance_a_little_below_0_is_noise(tmp_path):
+    pixels = np.random.default_rng(11).uniform(0.1, 0.5, (16, 16, 3)).astype(np.float32)
+    pixels[3, 4] = -0.01
+    frame = Frame("a", tmp_path / "a.exr", np.eye(4), {"camera_angle_x": 0.5})
+    write_image(tmp_path / "a.exr", pixels)
+    rgba = load_photo(frame, 1, "object").rgba
+    assert not rgba[3, 4, :3].any() and rgba[..., :3].any(axis=-1).sum() == 255
+    write_image(tmp_path / "a.exr", np.where(pixels < 0, 100 * pixels, pixels))
+    with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
+        load_photo(frame, 1, "object")
 
 
 def test_downscale_divides_size_and_intrinsics(scene):

@@ -31,8 +31,7 @@ def covered(asset, size: int) -> torch.Tensor:
 @pytest.fixture(scope="module")
 def plain():
     """A ball of one colour."""
-    mesh = trimesh.creation.icosphere(subdivisions=4)
-    return textured(mesh.vertices, mesh.faces, SIZE)
+    return textured(trimesh.creation.icosphere(subdivisions=4), SIZE)
 
 
 def pattern(texels: FineTexels) -> np.ndarray:

@@ -19,13 +19,9 @@ import pytest
 import splitnerf.ops as ops
 from doc_blocks import PAGES, ROOT, Block, blocks_of, inline_commands, name_of
 from splitnerf.cli import DONE, build_parser, main
+from splitnerf.config.settings import tomllib
 from splitnerf.data.images import write_image
 from tiny_runs import SMALL, as_options, train
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
 PAGES_WITH_CODE = [page for page in PAGES if not all(block.language.startswith("{") for block in blocks_of(page))]

@@ -11,8 +11,7 @@ import pytest
 import torch
 import trimesh
 from painted_ball import bare
-from published_scenes import write_set
-from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.cli import DONE, main
 from splitnerf.data.asset import Material
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
@@ -21,7 +20,7 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate import lpips as ours
 from splitnerf.evaluate.lpips import BACKBONE_WEIGHTS, find_distance
 from splitnerf.evaluate.protocol import ScaledView, scaled_scores
-from splitnerf.evaluate.score_table import evaluation_table
+from splitnerf.evaluate.score_table import evaluation_table, table_of_lights
 from splitnerf.evaluate.scoring import (
     Protocol,
     RelitViews,
@@ -34,6 +33,7 @@ from splitnerf.evaluate.scoring import (
     relight_scores,
 )
 from splitnerf.export.writers import write_glb
+from tiny_runs import refused
 
 SIZE = 16
 
@@ -172,6 +172,18 @@ def test_table():
     assert "mean" not in evaluation_table([("chair", FULL)])
 
 
+def test_published_scores_stand_below_ours():
+    head, ours, *published, source = table_of_lights(
+        FULL | {"albedo": {"psnr": 26.0, "ssim": None}}, "chair"
+    ).splitlines()
+    assert (
+        ours.split() == ["chair,", "this", "scene", "27.13", "0.941", "-", "26.00", "-", "-"] and "relight, dB" in head
+    )
+    assert published[0].split()[-6:] == ["27.81", "0.944", "0.058", "-", "-", "-"]
+    assert published[1].split() == ["SplitNeRF", "27.31", "0.941", "0.061", "25.29", "0.924", "0.108"]
+    assert "the SplitNeRF paper" in source and len(published) == 2
+
+
 def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
     for name in ("chair", "lego"):
         (tmp_path / name).mkdir()
@@ -198,9 +210,7 @@ def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
 )
 def test_usage_that_makes_no_sense(tmp_path, capsys, arguments, message):
     (tmp_path / "run").mkdir()
-    assert main(["evaluate"] + [a.replace("RUN", str(tmp_path / "run")) for a in arguments]) == BAD_INPUT
-    error = capsys.readouterr().err
-    assert message in error and error.count("\n") == 1
+    assert message in refused(capsys, "evaluate", *(a.replace("RUN", str(tmp_path / "run")) for a in arguments))
     assert not list(tmp_path.glob("run/*"))
 
 
@@ -396,20 +406,15 @@ def test_what_is_missing_is_said_in_a_line(weights, monkeypatch, tmp_path):
     assert refused().startswith(f"{weights} cannot be used (")
 
 
-def test_a_published_protocol_has_it_or_says_why_not(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("published_scenes.SPP", 4)
-    root = write_set(tmp_path, "shiny", False).root
-    asset, light = next(tmp_path.rglob("asset.glb")), root / "light.hdr"
-    command = ["evaluate", str(asset), "--data", str(root), "--env", str(light), "--protocol", "shiny"]
-    command += ["--spp", "2", "--views", "1", "--out", str(tmp_path / "scores.json")]
-    monkeypatch.setattr("splitnerf.evaluate.published.scoring.find_distance", lambda: (lambda image, truth: 0.125, ""))
-    assert main(command) == DONE
-    printed = capsys.readouterr().out
-    assert "novel, LPIPS" in printed and "0.125" in printed and "LPIPS was not" not in printed
-    monkeypatch.setattr("splitnerf.evaluate.published.scoring.find_distance", lambda: (None, "x.pth is missing"))
-    assert main(command) == DONE
-    printed = capsys.readouterr().out
-    assert "note: LPIPS was not computed: x.pth is missing" in printed and "novel, LPIPS" not in printed
+def test_a_published_protocol_says_why_it_is_not_there(data, monkeypatch, capsys):
+    """Where relit views were scored, above the paper's own scores."""
+    monkeypatch.setattr("splitnerf.cli.evaluate.evaluate_target", lambda *_: FULL)
+    monkeypatch.setattr("splitnerf.evaluate.lpips.find_distance", lambda: (None, "x.pth is missing"))
+    for lights, n_methods in (("low", 2), ("high", 0)):
+        assert main(["evaluate", "a.glb", "--data", str(data), "--lights", lights]) == DONE
+        printed = capsys.readouterr().out
+        assert printed.count("note: LPIPS was not computed: x.pth is missing") == 1
+        assert printed.count("\nSplitNeRF") == n_methods
 
 
 def test_the_packages_own_network(weights):

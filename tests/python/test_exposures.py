@@ -19,7 +19,7 @@ from splitnerf.ops.training import pixel_losses
 from splitnerf.training import exposure
 from splitnerf.training.batches import draw_batch, edge_runs
 from splitnerf.training.exposure import COLOUR_ERROR, ENOUGH, ERROR, PhotoExposures
-from tiny_runs import tiny, train
+from tiny_runs import refused, tiny, train
 
 CPU = torch.device("cpu")
 
@@ -192,8 +192,8 @@ class TestRun:
         with pytest.raises(InputError, match="is not of these photos"):
             with_exposures(views, run)
         capsys.readouterr()
-        assert main(["refine", str(run), "--data", str(data), "--out", str(tmp_path / "again"), "--sweeps", "1"]) == 2
-        assert "is not of these photos" in capsys.readouterr().err
+        error = refused(capsys, "refine", run, "--data", data, "--out", tmp_path / "again", "--sweeps", "1")
+        assert "is not of these photos" in error
         arguments = "--steps", "30", "--set", "exposure.refine=no", "--overwrite"
         assert train(data, run, *arguments) == 0 and not (run / EXPOSURES).exists()
         assert with_exposures(views, run) is views

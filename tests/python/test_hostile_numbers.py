@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from mesh_shapes import scene_of
 from splitnerf.fields.occlusion import bit_counts
 from splitnerf.ops import MeshScene, occlusion_factors
 from splitnerf.ops._library import lib
@@ -16,8 +17,7 @@ DOWN, ABOVE = torch.tensor([0.0, 0.0, -1.0]), torch.tensor([0.0, 0.0, 3.0])
 
 @pytest.fixture(scope="module")
 def ball() -> MeshScene:
-    mesh = trimesh.creation.icosphere(subdivisions=2)
-    return MeshScene(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    return scene_of(trimesh.creation.icosphere(subdivisions=2))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, 1e18, 3e38])

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from blender_data import directions_of_map
 from PIL import Image
 from splitnerf import _core
 from splitnerf.data import images
@@ -103,19 +104,11 @@ def write_raw(path, pixels):
     return path
 
 
-def directions(height, width):
-    """Unit vectors through the texels' centres: u = 0.5 - azimuth / (2 pi), v = polar angle / pi."""
-    azimuth = 2 * np.pi * (0.5 - (np.arange(width) + 0.5) / width)[None]
-    polar = np.pi * ((np.arange(height) + 0.5) / height)[:, None]
-    parts = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
 def test_texels_are_met_at_their_directions_and_blend_between(tmp_path):
     radiance = np.random.default_rng(0).random((8, 16, 3), np.float32)
     write_image(tmp_path / "a.exr", radiance)
     assert np.array_equal(read_environment(tmp_path / "a.exr"), radiance)
-    towards = directions(8, 16)
+    towards = directions_of_map(8)
     assert sample_environment(radiance, 7 * towards) == pytest.approx(radiance, abs=1e-5)
     # Half a texel on: the mean of neighbours, across the seam too (the last column's neighbour is the first).
     half = rotate_z(towards, -np.pi / 16)
@@ -136,7 +129,7 @@ def test_a_quarter_turn_of_light_is_a_quarter_turn_of_columns():
     assert np.array_equal(rotate_environment(radiance, -90), np.roll(radiance, 2, axis=1))
     assert np.array_equal(rotate_environment(radiance, 360), radiance)
     # What came from d comes from d turned counter-clockwise.
-    towards = directions(4, 8)
+    towards = directions_of_map(4)
     turned = sample_environment(rotate_environment(radiance, 90), rotate_z(towards, np.pi / 2))
     assert turned == pytest.approx(radiance, abs=1e-5)
 

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from blender_data import ANGLE, look_at, poses_around, sphere_alpha
 from scipy.spatial.transform import Rotation
-from splitnerf.cli import BAD_INPUT, DONE, main
+from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.reading import Reading
 from splitnerf_tools.inspection.checks import Inspection, inspect
 from splitnerf_tools.inspection.directions import find_upward, largest_gap
 from splitnerf_tools.inspection.reduced_views import views_of
+from tiny_runs import refused
 
 SIZE, COUNT, ALL = 100, 24, Reading("all")
 BALLS = (((0.0, 0.0, 0.0), 0.7), ((0.5, 0.2, 0.3), 0.5), ((-0.1, -0.6, -0.2), 0.4))  # unlike from all sides
@@ -191,6 +192,5 @@ def test_held_out_photos_are_looked_at_too(tmp_path, capsys):
 )
 def test_bad_input_is_refused(tmp_path, capsys, data, out, said):
     Photos().write(tmp_path / "data")
-    assert main(["inspect", str(tmp_path / data), "--out", str(tmp_path / out)]) == BAD_INPUT
-    assert said in capsys.readouterr().err
+    assert said in refused(capsys, "inspect", tmp_path / data, "--out", tmp_path / out)
     assert not (tmp_path / out).exists()

@@ -15,19 +15,9 @@ from splitnerf.data.images import write_image
 from splitnerf.evaluate.scoring import Protocol, evaluate_asset
 from splitnerf.export.writers import write_glb
 from splitnerf_tools.synth.rendering import SynthSettings, synthesise
+from test_synth import piece
 
 SPP = 4
-
-
-def ball(colour, metallic, roughness, radius, offset):
-    """A ball of one material, without texture coordinates."""
-    mesh = trimesh.creation.icosphere(subdivisions=3, radius=radius)
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
-    )
-    visual = trimesh.visual.TextureVisuals(material=material)
-    normals = np.array(mesh.vertex_normals)
-    return trimesh.Trimesh(mesh.vertices + offset, mesh.faces, vertex_normals=normals, visual=visual, process=False)
 
 
 def spoiled(asset: Asset) -> Asset:
@@ -48,8 +38,8 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("limits")
     scene = trimesh.Scene(
         {
-            "large": ball((0.6, 0.2, 0.1), 0.0, 0.3, 0.6, (0, 0, 0)),
-            "small": ball((0.8, 0.8, 0.4), 1.0, 0.2, 0.3, (0.9, 0, 0)),
+            "large": piece(trimesh.creation.icosphere(3, 0.6), (0.6, 0.2, 0.1), 0.0, 0.3, (0, 0, 0)),
+            "small": piece(trimesh.creation.icosphere(3, 0.3), (0.8, 0.8, 0.4), 1.0, 0.2, (0.9, 0, 0)),
         }
     )
     (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))

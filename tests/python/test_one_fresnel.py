@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from blender_data import directions_of_map
 from op_checks import unit
 from splitnerf.data.asset import Asset, Material
 from splitnerf.ops import fibonacci_directions, split_sum_shade
@@ -43,13 +44,6 @@ def point(cosine: float, roughness: float, metallic: float) -> tuple[torch.Tenso
     return torch.tensor([[0.0, 0.0, 1.0]]), view, torch.tensor([ALBEDO]), column(roughness), column(metallic)
 
 
-def directions_of_map() -> np.ndarray:
-    polar = (np.arange(HEIGHT) + 0.5) / HEIGHT * np.pi
-    azimuth = np.pi - (np.arange(2 * HEIGHT) + 0.5) / HEIGHT * np.pi
-    x, y = np.sin(polar)[:, None] * np.cos(azimuth), np.sin(polar)[:, None] * np.sin(azimuth)
-    return np.stack([x, y, np.broadcast_to(np.cos(polar)[:, None], x.shape)], -1)
-
-
 def furnace(cosine: float) -> np.ndarray:
     return np.ones((HEIGHT, 2 * HEIGHT, 3), np.float32)
 
@@ -58,7 +52,7 @@ def lamp(cosine: float) -> np.ndarray:
     """A small lamp, ten degrees beside the mirrored view, over next to nothing."""
     x, _, z = view_at(cosine)
     towards = unit(torch.tensor([[-x, 0.17, z]]).double()).numpy()[0]
-    light = 0.02 + 40 * np.exp(60 * (directions_of_map() @ towards - 1))
+    light = 0.02 + 40 * np.exp(60 * (directions_of_map(HEIGHT) @ towards - 1))
     return np.repeat(light[..., None], 3, -1).astype(np.float32)
 
 

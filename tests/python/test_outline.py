@@ -121,7 +121,7 @@ def pair():
     box.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 2, 3]))
     box.apply_translation([0.9, 0.1, 0.2])
     both = trimesh.util.concatenate([ball, box])
-    asset = textured(both.vertices, both.faces)
+    asset = textured(both)
     return asset, photos(asset, sky())
 
 
@@ -196,7 +196,7 @@ def ball_over_plate():
     plate = trimesh.creation.box((3.0, 3.0, 0.2))
     plate.apply_translation((-0.3, 0.2, -1.1))
     both = trimesh.util.concatenate([trimesh.creation.icosphere(subdivisions=4, radius=0.5), plate.subdivide_loop(0)])
-    return textured(np.asarray(both.vertices), np.asarray(both.faces), SIZE)
+    return textured(both, SIZE)
 
 
 def glowing_sky(degrees: float, direction: np.ndarray = SUN, height: int = 64) -> np.ndarray:

@@ -1,13 +1,11 @@
 """Losses and the shading model against closed forms."""
 
-import copy
 import math
 from types import SimpleNamespace
 
 import pytest
 import torch
 from splitnerf.config import Config
-from splitnerf.fields import LightPyramid
 from splitnerf.training import losses
 
 
@@ -18,14 +16,6 @@ def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
         shaded=torch.arange(len(weights)),
         points=SimpleNamespace(metallic=torch.tensor(metallic)[:, None]),
     )
-
-
-def test_the_sets_of_light_directions():
-    for name in ("fibonacci", "uniform"):
-        config = Config().replace({"light_set": name, "light_samples": 400})
-        w = losses.light_directions(config, torch.Generator().manual_seed(0))
-        assert w.shape == (400, 3) and w.mean(0).norm() < 0.15
-        torch.testing.assert_close(w.norm(dim=1), torch.ones(400))
 
 
 class Sky:
@@ -49,21 +39,6 @@ def test_neutral_light_loss_measures_chroma_alone():
     assert losses.neutral_light_loss(coloured, config, generator).item() == pytest.approx(0.5 / 3, rel=1e-4)
     tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, generator).item()
     assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
-
-
-def test_the_lights_prior_costs_a_texel_what_its_level_is_worth():
-    """A light of one colour is free; a texel costs log(1 + d^2 / (3 s^2)) of its level's texels, s 0.5 in grey and 0.2 in colour."""
-    light = LightPyramid(16)
-    assert losses.light_prior_loss(light).item() == pytest.approx(0.0, abs=1e-12)
-    with torch.no_grad():
-        light.texels[:16] += torch.tensor([0.5, 0.0, -0.7])
-    assert losses.light_prior_loss(light).item() == pytest.approx(0.0, abs=1e-6)
-    for texel, n in ((16, 64), (16 + 64 + 7, 256)):
-        for change, cost in (([0.9] * 3, 0.81 / 0.75), ([0.9, 0.0, -0.9], 0.54 / 0.12)):
-            changed = copy.deepcopy(light)
-            with torch.no_grad():
-                changed.texels[texel] += torch.tensor(change)
-            assert losses.light_prior_loss(changed).item() == pytest.approx(math.log1p(cost) / n, rel=1e-3)
 
 
 def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:

@@ -15,7 +15,7 @@ from splitnerf.data.asset import Asset, Material
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.export.writers import write_glb
-from splitnerf_tools.synth.rendering import WRITERS, SynthSettings, synthesise
+from splitnerf_tools.synth.rendering import SynthSettings, synthesise
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, shape_asset
 from tiny_runs import SMALL, as_options, lines_of
 
@@ -53,9 +53,8 @@ def random_scene(seed: int, folder: Path) -> Drawn:
     pick = lambda choices: list(choices)[draw.integers(len(choices))]
     light, fault, built_in = pick(LIGHTS), FAULTS[seed % len(FAULTS)], draw.random() < 0.3
     size, train = (int(np.exp(draw.uniform(np.log(a), np.log(b)))) for a, b in ((4, 120), (1.8, 60)))
-    test, spp, layout = int(draw.integers(1, 4)), int(pick((1, 4, 16))), pick(("blender", "blender", *WRITERS))
-    layout = layout if fault == "none" else "blender"
-    settings = SynthSettings(size=size, train=train, test=test, spp=spp, layout=layout, seed=seed)
+    test, spp = int(draw.integers(1, 4)), int(pick((1, 4, 16)))
+    settings = SynthSettings(size=size, train=train, test=test, spp=spp, seed=seed)
     if built_in:
         parts = [pick(SHAPES)]
         asset = shape_asset(parts[0], pick(MATERIALS), 48)

@@ -26,6 +26,7 @@ from splitnerf.refinement.stage import Refined, Stage
 from splitnerf.refinement.texels import AssetTexels, frames_of, materials_of, patch_width, texels_per_pixel
 from splitnerf.refinement.unknowns import N_UNKNOWNS, into_range, to_unknowns, to_values
 from splitnerf.render.path_traced import AssetRenderer
+from tiny_runs import refused
 
 
 def test_unknowns_stand_for_the_values_within_their_ranges():
@@ -98,9 +99,7 @@ def cornered() -> tuple[Asset, Dataset]:
     both = trimesh.util.concatenate([ball, plate])
     gloss = np.tile(np.float32([0.8, 1.0]), (SIZE, SIZE, 1))
     asset = with_textures(
-        textured(both.vertices, both.faces),
-        roughness_metallic_texture=gloss,
-        albedo_texture=np.full((SIZE, SIZE, 3), 0.9, np.float32),
+        textured(both), roughness_metallic_texture=gloss, albedo_texture=np.full((SIZE, SIZE, 3), 0.9, np.float32)
     )
     return asset, photos(asset, 0.4 * sky(), n=6, spp=256)
 
@@ -162,8 +161,7 @@ def test_the_level_of_the_light_is_set_before_the_fit(painted):
 
 def test_texels_know_their_points_on_the_mesh():
     """What a point of a triangle reads of its four texels' points is, inside charts, the point."""
-    mesh = trimesh.creation.icosphere(subdivisions=2)
-    asset = textured(mesh.vertices, mesh.faces, 256)
+    asset = textured(trimesh.creation.icosphere(subdivisions=2), 256)
     texels, triangle = AssetTexels(asset), np.arange(len(asset.triangles))
     third = np.full(len(triangle), 1 / 3)
     at = texels.sample(triangle, third, third, asset.vertices[asset.triangles[:, 0]])
@@ -174,8 +172,7 @@ def test_texels_know_their_points_on_the_mesh():
 
 def test_texels_on_both_sides_of_a_seam_are_neighbours():
     """Along all seams, next to each other in space; a direction of space has one tilt, whichever frame it is told in."""
-    mesh = trimesh.creation.icosphere(subdivisions=3)
-    asset = textured(mesh.vertices, mesh.faces, 256)
+    asset = textured(trimesh.creation.icosphere(subdivisions=3), 256)
     texels = AssetTexels(asset)
     chart, (i, j) = torch.from_numpy(texels.chart), texels.pairs.unbind(1)
     seam = chart[i] != chart[j]
@@ -299,12 +296,10 @@ def test_photos_that_show_nothing_of_the_asset_are_refused(painted):
 def test_the_command_writes_an_asset_and_says_what_is_wrong(tmp_path, capsys, painted, data):
     run = tmp_path / "run"
     run.mkdir()
-    assert main(["refine", str(run), "--data", str(data)]) == BAD_INPUT
-    assert "mesh.glb" in capsys.readouterr().err
+    assert "mesh.glb" in refused(capsys, "refine", run, "--data", data)
     asset = replace(painted[0], vertices=0.8 * painted[0].vertices)
     write_glb(run / "mesh.glb", asset)
-    assert main(["refine", str(run), "--data", str(data)]) == BAD_INPUT
-    assert "environment.exr" in capsys.readouterr().err
+    assert "environment.exr" in refused(capsys, "refine", run, "--data", data)
     write_environment(run, sky(32))
     assert main(["refine", str(run), "--data", str(data), "--sweeps", "0"]) == BAD_INPUT
     assert not (run / "refined").exists()
@@ -325,8 +320,7 @@ def test_a_sweep_has_no_more_pixels_than_it_may(painted, monkeypatch):
 
 def test_a_patch_is_two_pixels_wide(painted):
     """Texels share the ball's area of 4 pi; a pixel is 3.4 / 60 wide at its middle."""
-    mesh = trimesh.creation.icosphere(subdivisions=3)
-    asset = textured(mesh.vertices, mesh.faces, 256)
+    asset = textured(trimesh.creation.icosphere(subdivisions=3), 256)
     edge = np.sqrt(4 * np.pi / len(AssetTexels(asset).index))
     pixel = texels_per_pixel(painted[1], asset)
     assert pixel == pytest.approx(3.4 / 60 / edge, rel=0.05)

@@ -1,4 +1,4 @@
-"""Fields, occupancy, rendering, meshing and losses: closed forms of a sphere and of constant light."""
+"""Which cells of the grid are occupied, and the hull of the masks: closed forms of a sphere."""
 
 import math
 

@@ -33,9 +33,8 @@ def rows_of(name: str, n: int, seed: int = 0) -> dict:
 def test_errors_stay_within_the_promise(name):
     """Errors of outputs and gradients against float64, of float64 against 50 digits, and nothing not finite."""
     found = search.run(BY_NAME[name], FEWER.get(name, CASES), exact=EXACT)
-    assert found.holds, f"{table.result_line(found)} exact {found.exact} not finite {found.broken}\n" + "\n".join(
-        f"{which}: {text}" for _, which, text in table.inputs_of([found], [])
-    )
+    worst = (table.input_text(rows) for rows in (found.worst_forward, found.worst_gradient))
+    assert found.holds, "\n".join([f"{table.result_line(found)} not finite {found.broken} exact {found.exact}", *worst])
 
 
 @pytest.mark.parametrize("claim", table.PROPERTIES, ids=lambda claim: claim.name)

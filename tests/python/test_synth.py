@@ -1,11 +1,10 @@
-"""Rendered data sets: what each layout's files hold against the renderer's arrays, and built-in shapes."""
+"""Rendered data sets: what the files hold against the renderer's arrays, and built-in shapes."""
 
 import json
 
 import numpy as np
 import pytest
 import trimesh
-from published_scenes import part
 from splitnerf.cli import BAD_INPUT, DONE, build_parser, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.gltf import read_asset
@@ -17,19 +16,30 @@ from splitnerf_tools.commands import synth as synth_command
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise, unit_sphere
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
-from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter
+from splitnerf_tools.synth.writer import SceneWriter
 from tiny_runs import command
 
 SIZE = 24
 HALF_STEP = 0.5 / 255 + 1e-6
 
 
+def piece(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float, offset: tuple) -> trimesh.Trimesh:
+    """A mesh with its material, moved, z up turned to glTF's y up."""
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
+    )
+    vertices = (mesh.vertices + offset)[:, [0, 2, 1]] * [1, 1, -1]
+    normals = np.array(mesh.vertex_normals)[:, [0, 2, 1]] * [1, 1, -1]
+    visual = trimesh.visual.TextureVisuals(material=material)
+    return trimesh.Trimesh(vertices, mesh.faces, vertex_normals=normals, visual=visual, process=False)
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """An asset with no symmetry, off the origin, and two maps: one side bright, and a blue one."""
     folder = tmp_path_factory.mktemp("files")
-    ball = part(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
-    small = part(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
+    ball = piece(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
+    small = piece(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
     scene = trimesh.Scene({"ball": ball, "small": small})
     (folder / "balls.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
     sunny = np.full((16, 32, 3), 0.05, np.float32)
@@ -59,11 +69,10 @@ def close_images(image, maps):
     assert np.abs(image[seen][:, :3] - np.clip(linear_to_srgb(straight), 0, 1)).max() <= HALF_STEP
 
 
-@pytest.mark.parametrize("layout", FULL_TRUTH)
-def test_files_hold_what_was_rendered(files, tmp_path, layout):
+def test_files_hold_what_was_rendered(files, tmp_path):
     asset = read_asset(files / "balls.glb")
-    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4, layout)
-    writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
+    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4)
+    writer = SceneWriter(tmp_path, 0.6911112070083618)
     light = np.full((8, 16, 3), 0.5, np.float32)
     relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}
     render_views(recorder, writer, writer.light(light), relight, settings)
@@ -71,33 +80,27 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
     with pytest.raises(Exception, match="has neither"):
         load_dataset(tmp_path)
     writer.close()
-    (tmp_path / "val_000").mkdir()
 
     train, test = load_dataset(tmp_path), load_dataset(tmp_path, "test")
     assert (len(train), len(test)) == (3, 2)
-    assert test.frame_names == (["r_000", "r_001"] if layout == "blender" else ["test_000", "test_001"])
+    assert test.frame_names == ["r_000", "r_001"]
     for image, maps in zip(np.concatenate([train.images, test.images]), recorder.maps):
         close_images(image, maps)
     focal = 0.5 * SIZE / np.tan(0.5 * 0.6911112070083618)
     assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert test.world_poses == pytest.approx(orbit(2, 3.0233467, 30, 20), abs=1e-4)
 
-    truths = load_view_truths(test) + (load_view_truths(train) if layout == "tensoir" else [])
-    for truth, maps in zip(truths, recorder.maps[3:5] + recorder.maps[:3]):
+    for truth, maps in zip(load_view_truths(test), recorder.maps[3:5]):
         solid = maps["alpha"] > 0.92
         assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
-        encoded = linear_to_srgb if layout == "blender" else np.asarray  # the others keep albedo linear
-        assert np.abs(encoded(truth.albedo[solid]) - encoded(maps["albedo"][solid])).max() <= HALF_STEP
+        assert np.abs(linear_to_srgb(truth.albedo[solid]) - linear_to_srgb(maps["albedo"][solid])).max() <= HALF_STEP
         unit = maps["smooth_normal"] / np.maximum(np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True), 1e-8)
         assert np.linalg.norm(truth.normal[solid] - unit[solid], axis=-1).max() < np.radians(0.6)
-        if layout == "blender":
-            assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
-            assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
-            stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
-            assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
-        else:
-            assert truth.roughness is None and truth.metallic is None
-    assert (load_view_truths(train)[0].albedo is None) == (layout != "tensoir")
+        assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
+        assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
+        stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
+        assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
+    assert load_view_truths(train)[0].albedo is None
 
     assert list(relight_maps(test)) == ["a", "b_1"]
     for k, name in enumerate(relight_maps(test)):
@@ -167,13 +170,9 @@ def test_bad_input_writes_nothing(files, tmp_path):
     (tmp_path / "full/notes.txt").write_text("mine")
     with pytest.raises(Exception, match="full: exists and is not an empty folder"):
         bad(files, tmp_path, out=tmp_path / "full")
-    for numbers, layout, message in (
-        ((0, 1, 1, 1), "blender", "--size must be at least 1"),
-        ((8, 1, 1, 0), "blender", "--spp must be at least 1"),
-        ((8, 1, 1, 1), "nerf", "--layout must be one of"),
-    ):
+    for numbers, message in (((0, 1, 1, 1), "--size must be at least 1"), ((8, 1, 1, 0), "--spp must be at least 1")):
         with pytest.raises(Exception, match=message):
-            bad(files, tmp_path, settings=SynthSettings(*numbers, layout=layout))
+            bad(files, tmp_path, settings=SynthSettings(*numbers))
     (tmp_path / "more").mkdir()
     (tmp_path / "more/relight_blue.exr").write_bytes((files / "blue.exr").read_bytes())
     with pytest.raises(Exception, match="two maps are called blue"):

@@ -8,9 +8,7 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, add_reading_options, examples, print_scores, reading_of
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "protocol")
-OWN_RULES = ("sheet", "lights", "table", "eval_mode", "mask_kind")  # options of this project's protocol
-SETS = ("nerfactor", "tensoir", "shiny")
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -20,11 +18,11 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         description="Path-traces the test views of DATA, of the asset that RUN's refinement fitted or of a GLB file (a RUN "
         "without refinement is rendered from its checkpoint), relights the asset under the data's maps, and writes "
         "evaluation.json and report.html into RUN (for a file FILE_evaluation.json next to it). Without --data it reads the "
-        "scores written before, for --table. With --protocol it scores by the rules of a published set.",
+        "scores written before, for --table.",
         epilog=examples(
             "splitnerf evaluate runs/a --data data",
             "splitnerf evaluate runs/a runs/b --table table.md",
-            "splitnerf evaluate runs/a --data hotdog --protocol nerfactor --maps lights",
+            "splitnerf evaluate runs/a --data hotdog --lights low --maps lights",
         ),
     )
     add = parser.add_argument
@@ -46,12 +44,6 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         help="a published relighting protocol, 20 views: low, 8 low-frequency probes; high, 7 maps",
     )
     add(
-        "--protocol",
-        choices=SETS,
-        metavar="SET",
-        help=f"score mesh.glb by the rules of a published set, print the published scores too, and write RUN/SET.json: {', '.join(SETS)}",
-    )
-    add(
         "--maps",
         type=Path,
         metavar="FOLDER",
@@ -71,15 +63,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     check_usage(args)
+    from splitnerf.evaluate.lpips import find_distance
     from splitnerf.evaluate.scoring import read_evaluation
     from splitnerf.run_folder import refuse_no_run
 
     data = args.data or []
     evaluations = []
     for i, target in enumerate(args.targets):
-        if args.protocol:
-            score_by_set(target, data[min(i, len(data) - 1)], args)
-            continue
         if data:
             scores = evaluate_target(target, data[min(i, len(data) - 1)], args)
         else:
@@ -91,9 +81,11 @@ def run(args: argparse.Namespace) -> int:
             print(f"{target}:")
         print_scores(scores)
         if args.lights == "low":
-            from splitnerf.evaluate.published.scoring import table_of_lights
+            from splitnerf.evaluate.score_table import table_of_lights
 
-            print(table_of_lights(scores, f"{scene_name(target)}, this scene"))
+            print(table_of_lights(scores, scene_name(target)))
+        if args.lights and scores["relight"]["lpips"] is None:
+            print(f"note: LPIPS was not computed: {find_distance()[1]}")
     if args.table:
         from splitnerf.evaluate.score_table import evaluation_table
         from splitnerf.files import atomic_path
@@ -107,7 +99,6 @@ def run(args: argparse.Namespace) -> int:
 def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
     where two options exclude each other, or a file would be lost; the message names them."""
-    from splitnerf.evaluate.published.scoring import holds_published, published_path
     from splitnerf.evaluate.score_table import holds_table
     from splitnerf.evaluate.scoring import evaluation_path, holds_evaluation, is_asset
     from splitnerf.run_folder import data_of
@@ -118,14 +109,6 @@ def check_usage(args: argparse.Namespace) -> None:
         if None in known:
             raise InputError(f"--{given[0]} needs --data; without it the scores written before are read")
         args.data = [data for data, _ in known]
-    ruled_out = [name for name in OWN_RULES if getattr(args, name) is not None]
-    if args.protocol and (ruled_out or args.downscale is not None):
-        name = (ruled_out or ["downscale"])[0].replace("_", "-")
-        raise InputError(f"--{name} cannot be used with --protocol, which has rules of its own; leave it out")
-    if args.protocol and args.views is not None and args.protocol not in ("tensoir", "shiny"):
-        raise InputError(
-            f"--views cannot be used with --protocol {args.protocol}, which chooses its views; leave it out"
-        )
     if args.data and len(args.data) not in (1, len(args.targets)):
         raise InputError(
             f"--data was given {len(args.data)} times for {len(args.targets)} runs; give it once, or once each"
@@ -137,10 +120,8 @@ def check_usage(args: argparse.Namespace) -> None:
         raise InputError(f"{args.sheet}: a sheet must end in .png or .jpg")
     if args.sheet is not None and args.sheet.exists():
         raise InputError(f"{args.sheet}: exists, and would be replaced; give another --sheet")
-    holds = holds_published if args.protocol else holds_evaluation
     assets = [target for target in args.targets if is_asset(target) and args.data]  # a run's scores are in its folder
-    beside = [published_path(asset, args.protocol) if args.protocol else evaluation_path(asset) for asset in assets]
-    outs = [("out", path, holds) for path in ([args.out] if args.out else beside)]
+    outs = [("out", path, holds_evaluation) for path in ([args.out] if args.out else map(evaluation_path, assets))]
     for name, path, is_ours in (("table", args.table, holds_table), *outs):
         if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
             raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --{name}")
@@ -169,29 +150,6 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
         write_sheet(args.sheet, evaluated)
         print(f"sheet: {args.sheet}")
     return evaluated.scores
-
-
-def score_by_set(target: Path, data: Path, args: argparse.Namespace) -> None:
-    """Scores one run or file by the protocol of a published set, writes the scores, and prints them with published
-    ones."""
-    from splitnerf.data.json_files import write_json
-    from splitnerf.evaluate.published.common import Options
-    from splitnerf.evaluate.published.scoring import published_path, score_published, table
-    from splitnerf.evaluate.scoring import is_asset
-
-    if args.env is not None and not is_asset(target):
-        raise InputError(f"{target}: is no GLB file, and a run has its own light; leave --env out")
-    options = Options(args.spp, args.maps, args.views)
-    content = score_published(target, data, args.protocol, options, args.env)
-    path = args.out or published_path(target, args.protocol)
-    write_json(path, content)
-    print(f"{args.protocol}, {len(content['images'])} images, {args.spp} paths a pixel:")
-    print(table(args.protocol, content["scores"], f"{scene_name(target)}, this scene"))
-    for note in content["notes"]:
-        print(f"note: {note}")
-    if content["published"]["rows"]:
-        print(f"published: {content['published']['source']} ({content['published']['date']})")
-    print(f"scores: {path}")
 
 
 def scene_name(target: Path) -> str:

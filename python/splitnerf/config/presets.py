@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-
-from splitnerf.config.settings import SHORT_NAMES, Config
+from splitnerf.config.settings import SHORT_NAMES, Config, tomllib
 from splitnerf.errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 # The paper's settings, or those of its released code, where they state them, and ours where they do not:
 # tests/python/test_config.py names the source of most of theirs. Shares of the run stand for 20,000 steps.

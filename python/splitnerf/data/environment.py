@@ -12,7 +12,6 @@ from splitnerf.errors import InputError, note
 
 ASPECT_TOLERANCE = 0.02
 BRIGHTEST = 1e12  # W / m^2 / sr; the sun has 1e7
-MAP_ROWS = 512  # of a map that is turned
 FINER = 3  # samples across a texel of a turned map
 NEGATIVE_SHARE = 1e-3  # largest share of the map's sum; resampling and compression leave so much
 

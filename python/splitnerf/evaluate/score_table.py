@@ -26,6 +26,15 @@ COLUMNS = (
 )
 
 
+# What the SplitNeRF paper (Zarzar and Ghanem) reports of 20 test views under 8 low-frequency probes, with one factor per channel
+# on the images: relit views, then albedo, each as PSNR, SSIM and LPIPS; means over its four scenes.
+PUBLISHED: dict[str, Sequence[float]] = {
+    "SplitNeRF, mip-map light": (27.81, 0.944, 0.058),
+    "SplitNeRF": (27.31, 0.941, 0.061, 25.29, 0.924, 0.108),
+}
+SOURCE = "published: the SplitNeRF paper, collected by this project in November 2026; mean of its four scenes"
+
+
 def value_at(evaluation: object, keys: Sequence[str]) -> float | None:
     """A number of an evaluation.json by its keys; None where there is none."""
     for key in keys:
@@ -49,6 +58,18 @@ def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
     if len(rows) > 1:
         lines.append(["**mean**"] + [_mean([v[key] for _, v in rows], text) for key, _, text, _ in COLUMNS])
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def table_of_lights(evaluation: dict, label: str) -> str:
+    """Lines of text: the scores of an evaluation with `--lights low` above those that were published so, and where they are from."""
+    values, columns = values_of(evaluation), COLUMNS[:6]
+    rows = {f"{label}, this scene": [values[name] for name, *_ in columns], **PUBLISHED}
+    texts = ("{:.2f}", "{:.3f}", "{:.3f}") * 2
+    lines = [["", *(title for _, title, *_ in columns)]]
+    lines += [[name, *map(_cell, [*row, *[None] * 3][:6], texts)] for name, row in rows.items()]
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    shown = ["  ".join([name.ljust(widths[0]), *map(str.rjust, cells, widths[1:])]) for name, *cells in lines]
+    return "\n".join([*shown, SOURCE])
 
 
 def holds_table(path: Path) -> bool:

@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from splitnerf.config import Config
 from splitnerf.data.environment import seen_at
 from splitnerf.devices import pinned
-from splitnerf.fields import EvaluatedLight, Light, LightPyramid
+from splitnerf.fields import EvaluatedLight, Light
 from splitnerf.ops import MeshScene, fibonacci_directions, occlusion_factors, prefilter_light
 from splitnerf.ops.light import light_prior, sample_ggx_lobe
 from splitnerf.ops.training import gradient_losses, pixel_losses, quadratic_entropy
@@ -137,7 +137,9 @@ def loss_terms(
         if w.neutral_weight:
             terms.add({"neutral": w.neutral_weight * since}, neutral_light_loss(light, c, generator))
         if w.light_prior_weight and c.light.kind == "pyramid":
-            terms.add({"light_prior": w.light_prior_weight * since}, light_prior_loss(model.light))
+            terms.add(
+                {"light_prior": w.light_prior_weight * since}, light_prior(model.light.texels, model.light.level_sizes)
+            )
         if seen is not None and w.seen_weight:
             terms.add({"seen_light": w.seen_weight * since}, seen.loss(light))
     if environment is not None:
@@ -207,12 +209,6 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
     normals = F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
     log_light = torch.log(light(normals, torch.ones_like(normals[:, :1])) + 1e-6)
     return (log_light - log_light.mean(1, keepdim=True)).square().mean()
-
-
-def light_prior_loss(light: LightPyramid) -> Tensor:
-    """How far a light is from a smooth and grey one: many lights explain the photos of an object that is not a
-    mirror."""
-    return light_prior(light.texels, light.level_sizes)
 
 
 class SeenLight:

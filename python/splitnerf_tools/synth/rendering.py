@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +19,12 @@ from tqdm import tqdm
 
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.placement import write_placed_glb
-from splitnerf_tools.synth.published import NeusWriter, ShinyWriter
-from splitnerf_tools.synth.writer import FULL_TRUTH, SceneWriter, ViewWriter
+from splitnerf_tools.synth.writer import SceneWriter
 
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
 CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
 TRAIN_ELEVATIONS, TEST_ELEVATION, TEST_SWING = (-20.0, 78.0), 30.0, 20.0
 MAP_SIZE = (256, 512)
-
-
-WRITERS = {name: partial(SceneWriter, layout=name) for name in FULL_TRUTH} | {"shiny": ShinyWriter, "neus": NeusWriter}
-"""By the name that `--layout` takes: called with the folder and the horizontal field of view."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +36,6 @@ class SynthSettings:
         train: Number of train views.
         test: Number of test views.
         spp: Paths a pixel.
-        layout: A key of :data:`WRITERS`.
         seed: The seed of the renderings and of the first camera's azimuth.
         turntable: Whether the object turns before a camera that goes up and down alone, and the light with the camera.
     """
@@ -51,7 +44,6 @@ class SynthSettings:
     train: int = 100
     test: int = 20
     spp: int = 256
-    layout: str = "blender"
     seed: int = 0
     turntable: bool = False
 
@@ -62,12 +54,6 @@ class SynthSettings:
                 raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
         if self.seed < 0:
             raise InputError(f"--seed must not be negative, got {self.seed}")
-        if self.turntable and self.layout != "blender":
-            raise InputError(
-                f"--turntable: the layout {self.layout} has no word for the light's rotation; leave it out"
-            )
-        if self.layout not in WRITERS:
-            raise InputError(f"--layout must be one of {', '.join(WRITERS)}, got {self.layout}")
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
@@ -85,7 +71,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         settings: What to render.
 
     Returns:
-        The folder to train on: `out`, or one in it where the layout has one.
+        The folder to train on, `out`.
 
     Raises:
         InputError: The asset, a map, the folder or a setting cannot be used.
@@ -97,9 +83,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     names = [path.stem.removeprefix(PREFIX) for path in relight]
     if len(set(names)) < len(names):
         raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
-    writer: ViewWriter = WRITERS[settings.layout](out, CAMERA_ANGLE_X)
-    if relight and not writer.relights:
-        raise InputError(f"--relight: the layout {settings.layout} has no images in other lights; leave it out")
+    writer = SceneWriter(out, CAMERA_ANGLE_X)
     maps = [resized(read_environment(path)) for path in (light, *relight)]
     original = read_asset(asset)
     if any(any(material.emission) for material in original.materials):
@@ -118,7 +102,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
 
 def render_views(
     renderer: AssetRenderer,
-    writer: ViewWriter,
+    writer: SceneWriter,
     light: np.ndarray,
     relight: dict[str, np.ndarray],
     settings: SynthSettings,
@@ -151,14 +135,12 @@ def render_views(
 
         for split, poses in cameras.items():
             for i, pose in enumerate(poses):
-                if settings.turntable:
-                    here = turn_to(pose, cameras["train"][0])
-                    writer.view(split, i, pose, shot(turn_environment(light, here), pose), light_turn=here)
-                else:
-                    writer.view(split, i, pose, shot(light, pose))
+                here = turn_to(pose, cameras["train"][0]) if settings.turntable else None
+                lit = light if here is None else turn_environment(light, here)
+                writer.view(split, i, pose, shot(lit, pose), light_turn=here)
         for name, environment in relight.items():
             for i, pose in enumerate(cameras["test"]):
-                writer.relit("test", i, name, pose, shot(environment, pose))
+                writer.relit(i, name, shot(environment, pose))
 
 
 def turn_to(pose: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -1,52 +1,36 @@
-"""Writes rendered views as a dataset, in the layouts that hold full truth; all others are in
-:mod:`splitnerf_tools.synth.published`.
-
-Layouts:
-    blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
-                (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`.
-    nerfactor   a folder per view, `train_000`, `test_000`, with `rgba.png` and `metadata.json`; for test views also
-                `albedo.png`, `normal.png` and `rgba_<map>.png`.
-    tensoir     the same, with truth for the train views too.
-
-In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but
-the albedo of nerfactor and tensoir is linear), normals world space without the normal map.
+"""Writes rendered views as a dataset with its truth, in the form of NeRF-Blender: `transforms_{train,test}.json`, `{train,test}/r_000.png`;
+for test views also `_albedo.png`, `_orm.png` (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`; and
+`light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha, normals world space without the normal map.
 """
 
 from __future__ import annotations
 
-import abc
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.json_files import write_json
-from splitnerf.data.layouts import view_folders
 from splitnerf.data.truth import PREFIX, relit_path
 from splitnerf.export.scene import write_mesh_ply
 
-FULL_TRUTH = ("blender", "nerfactor", "tensoir")
 Maps = dict[str, np.ndarray]
 
 
-class ViewWriter(abc.ABC):
+class SceneWriter:
     """Takes the renderings of one scene; the files that name the views are written last, by `close`.
 
     Args:
-        root: The folder to train on; made where it is missing.
+        root: The dataset's folder; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
-
-    Attributes:
-        relights: Whether the layout has images under other lights.
 
     Raises:
         OSError: A file cannot be written (any method).
     """
 
-    relights = True
-
     def __init__(self, root: Path, camera_angle_x: float):
-        self.root, self.camera_angle_x = Path(root), camera_angle_x
+        self.root, self.camera_angle_x = root, camera_angle_x
+        self._frames: dict[str, list[dict]] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
         """Writes an environment map.
@@ -66,78 +50,40 @@ class ViewWriter(abc.ABC):
         """Writes the true mesh, vertices [n, 3] in the world of the cameras, triangles [m, 3]."""
         write_mesh_ply(self.root / "mesh.ply", trimesh.Trimesh(vertices, triangles, process=False))
 
-    @abc.abstractmethod
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps) -> None:
+    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps, light_turn: np.ndarray | None = None) -> None:
         """Writes a photo, and the truth of test views.
 
         Args:
             split: "train" or "test".
             index: Number of the view in its split.
             pose: [4, 4] camera-to-world, OpenGL axes.
-            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; where truth is written also `albedo`,
-                `roughness`, `metallic` and `smooth_normal`.
+            maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; for test views also `albedo`, `roughness`,
+                `metallic` and `smooth_normal`.
+            light_turn: [3, 3] that of :class:`splitnerf.data.layouts.frame.Frame`.
         """
-
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        """Writes a relit view under map `name`, after a call of :meth:`view` for it; `pose` and `maps` are as there."""
-
-    @abc.abstractmethod
-    def close(self) -> None:
-        """Writes the poses, which complete the dataset."""
-
-
-class SceneWriter(ViewWriter):
-    """A writer of a layout with full truth.
-
-    Args:
-        out: The dataset's folder; made where it is missing.
-        camera_angle_x: See :class:`ViewWriter`.
-        layout: One of `FULL_TRUTH`.
-    """
-
-    def __init__(self, out: Path, camera_angle_x: float, layout: str = "blender"):
-        super().__init__(out, camera_angle_x)
-        self.layout = layout
-        self._views: dict[str, list[tuple[Path, dict]]] = {}
-
-    def view(self, split: str, index: int, pose: np.ndarray, maps: Maps, light_turn: np.ndarray | None = None) -> None:
-        """See :meth:`ViewWriter.view`; `light_turn` [3, 3] is that of :class:`splitnerf.data.layouts.frame.Frame`."""
         image = self._image_path(split, index)
         write_image(image, straight_rgba(maps))
-        height, width = maps["alpha"].shape
-        if self.layout == "blender":
-            entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
-            entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
-        else:
-            entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
-            entry |= {"imw": width, "imh": height}
-        self._views.setdefault(split, []).append((image, entry))
-        if split == "test" or self.layout == "tensoir":
+        entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
+        entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
+        self._frames.setdefault(split, []).append(entry)
+        if split == "test":
             self._write_truth(image, maps)
 
-    def relit(self, split: str, index: int, name: str, pose: np.ndarray, maps: Maps) -> None:
-        write_image(relit_path(self._image_path(split, index), name), straight_rgba(maps))
+    def relit(self, index: int, name: str, maps: Maps) -> None:
+        """Writes a test view under map `name`."""
+        write_image(relit_path(self._image_path("test", index), name), straight_rgba(maps))
 
     def close(self) -> None:
-        for split, views in self._views.items():
-            if self.layout == "blender":
-                content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}
-                write_json(self.root / f"transforms_{split}.json", content)
-                continue
-            for image, entry in views:
-                write_json(image.with_name(view_folders.METADATA), entry)
+        """Writes the poses, which complete the dataset."""
+        for split, frames in self._frames.items():
+            content = {"camera_angle_x": self.camera_angle_x, "frames": frames}
+            write_json(self.root / f"transforms_{split}.json", content)
 
     def _image_path(self, split: str, index: int) -> Path:
-        if self.layout == "blender":
-            return self.root / split / f"r_{index:03d}.png"
-        return self.root / f"{split}_{index:03d}" / view_folders.PHOTO
+        return self.root / split / f"r_{index:03d}.png"
 
     def _write_truth(self, image: Path, maps: Maps) -> None:
         alpha, normal = maps["alpha"][..., None], maps["smooth_normal"]
-        if self.layout != "blender":
-            write_image(image.with_name("albedo.png"), np.concatenate([maps["albedo"], alpha], axis=-1))
-            write_image(image.with_name("normal.png"), np.concatenate([0.5 * normal + 0.5, alpha], axis=-1))
-            return
         albedo = np.concatenate([linear_to_srgb(maps["albedo"]), alpha], axis=-1)
         orm = np.stack([maps["alpha"] > 0, maps["roughness"], maps["metallic"], maps["alpha"]], axis=-1)
         write_image(image.with_name(f"{image.stem}_albedo.png"), albedo)

@@ -18,7 +18,6 @@ from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import Frame, checked_pose
 from splitnerf.data.lens import read_lens
 from splitnerf.errors import InputError
-from splitnerf.files import is_file
 
 METADATA, PHOTO = "metadata.json", "rgba.png"
 SPLITS = ("train", "test")
@@ -44,22 +43,12 @@ def read(root: Path, split: str | None) -> list[Frame]:
     return [_read_view(folder) for folder in folders]
 
 
-def read_others(root: Path, prefix: str) -> list[Frame]:
-    """The views `PREFIX_000` ... of a prefix that is no split, such as `val`, by number; those without a photo left out."""
-    return [_read_view(folder) for folder in _folders(root, prefix) if is_file(folder / PHOTO)]
-
-
 def parse_matrix(text: object) -> object:
     """The 4 x 4 nested list of a comma-separated string; anything else as it came, for the caller to refuse."""
     if not isinstance(text, str):
         return text
     numbers = [number.strip() for number in text.split(",")]
     return [numbers[4 * row : 4 * row + 4] for row in range(4)] if len(numbers) == 16 else numbers
-
-
-def format_matrix(pose) -> str:
-    """The inverse of `parse_matrix`, for a [4, 4] array."""
-    return ",".join(repr(float(value)) for row in pose for value in row)
 
 
 def _read_view(folder: Path) -> Frame:

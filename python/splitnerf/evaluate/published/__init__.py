@@ -1,1 +1,0 @@
-"""The protocols by which published data sets are scored."""
