@@ -17,7 +17,7 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import Distortion, read_lens, sample_cubic, undistort
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.photos import load_photo
-from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths, read_relit
+from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
 from splitnerf.refinement.pixels import covered_pixels
 
@@ -57,8 +57,6 @@ def test_view_folders(tmp_path):
     assert truth.normal[centre, centre] == pytest.approx([0, -0.6, 0.8], abs=0.006)
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and not truth.normal[0, 0].any()
     assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
-    write_image(root / "test_011/rgba_city.png", np.full((SIZE, SIZE, 4), [0.2, 0.4, 0.6, 1]))
-    assert read_relit(test, 1, "city")[centre, centre] == pytest.approx([0.2, 0.4, 0.6, 1], abs=1e-6)
 
 
 def test_normals_of_shiny_blender_are_whole(scene):

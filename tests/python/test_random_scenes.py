@@ -17,6 +17,7 @@ from splitnerf.data.images import read_image, read_radiance, write_image
 from splitnerf.export.writers import write_glb
 from splitnerf_tools.synth.rendering import SynthSettings, synthesise
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, shape_asset
+from splitnerf_tools.synth.writer import LAYOUTS
 from tiny_runs import SMALL, as_options, lines_of
 
 PARTS = {
@@ -53,8 +54,9 @@ def random_scene(seed: int, folder: Path) -> Drawn:
     pick = lambda choices: list(choices)[draw.integers(len(choices))]
     light, fault, built_in = pick(LIGHTS), FAULTS[seed % len(FAULTS)], draw.random() < 0.3
     size, train = (int(np.exp(draw.uniform(np.log(a), np.log(b)))) for a, b in ((4, 120), (1.8, 60)))
-    test, spp = int(draw.integers(1, 4)), int(pick((1, 4, 16)))
-    settings = SynthSettings(size=size, train=train, test=test, spp=spp, seed=seed)
+    test, spp, layout = int(draw.integers(1, 4)), int(pick((1, 4, 16))), pick(("blender", "blender", *LAYOUTS))
+    layout = layout if fault == "none" else "blender"
+    settings = SynthSettings(size=size, train=train, test=test, spp=spp, layout=layout, seed=seed)
     if built_in:
         parts = [pick(SHAPES)]
         asset = shape_asset(parts[0], pick(MATERIALS), 48)

@@ -1,4 +1,4 @@
-"""Rendered data sets: what the files hold against the renderer's arrays, and built-in shapes."""
+"""Rendered data sets: what each layout's files hold against the renderer's arrays, and built-in shapes."""
 
 import json
 
@@ -16,7 +16,7 @@ from splitnerf_tools.commands import synth as synth_command
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise, unit_sphere
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
-from splitnerf_tools.synth.writer import SceneWriter
+from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 from tiny_runs import command
 
 SIZE = 24
@@ -69,10 +69,11 @@ def close_images(image, maps):
     assert np.abs(image[seen][:, :3] - np.clip(linear_to_srgb(straight), 0, 1)).max() <= HALF_STEP
 
 
-def test_files_hold_what_was_rendered(files, tmp_path):
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_files_hold_what_was_rendered(files, tmp_path, layout):
     asset = read_asset(files / "balls.glb")
-    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4)
-    writer = SceneWriter(tmp_path, 0.6911112070083618)
+    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4, layout)
+    writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
     light = np.full((8, 16, 3), 0.5, np.float32)
     relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}
     render_views(recorder, writer, writer.light(light), relight, settings)
@@ -80,10 +81,11 @@ def test_files_hold_what_was_rendered(files, tmp_path):
     with pytest.raises(Exception, match="has neither"):
         load_dataset(tmp_path)
     writer.close()
+    (tmp_path / "val_000").mkdir()
 
     train, test = load_dataset(tmp_path), load_dataset(tmp_path, "test")
     assert (len(train), len(test)) == (3, 2)
-    assert test.frame_names == ["r_000", "r_001"]
+    assert test.frame_names == (["r_000", "r_001"] if layout == "blender" else ["test_000", "test_001"])
     for image, maps in zip(np.concatenate([train.images, test.images]), recorder.maps):
         close_images(image, maps)
     focal = 0.5 * SIZE / np.tan(0.5 * 0.6911112070083618)
@@ -93,13 +95,17 @@ def test_files_hold_what_was_rendered(files, tmp_path):
     for truth, maps in zip(load_view_truths(test), recorder.maps[3:5]):
         solid = maps["alpha"] > 0.92
         assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
-        assert np.abs(linear_to_srgb(truth.albedo[solid]) - linear_to_srgb(maps["albedo"][solid])).max() <= HALF_STEP
+        encoded = linear_to_srgb if layout == "blender" else np.asarray  # the other one keeps albedo linear
+        assert np.abs(encoded(truth.albedo[solid]) - encoded(maps["albedo"][solid])).max() <= HALF_STEP
         unit = maps["smooth_normal"] / np.maximum(np.linalg.norm(maps["smooth_normal"], axis=-1, keepdims=True), 1e-8)
         assert np.linalg.norm(truth.normal[solid] - unit[solid], axis=-1).max() < np.radians(0.6)
-        assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
-        assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
-        stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
-        assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
+        if layout == "blender":
+            assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
+            assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
+            stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
+            assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
+        else:
+            assert truth.roughness is None and truth.metallic is None
     assert load_view_truths(train)[0].albedo is None
 
     assert list(relight_maps(test)) == ["a", "b_1"]
@@ -170,9 +176,13 @@ def test_bad_input_writes_nothing(files, tmp_path):
     (tmp_path / "full/notes.txt").write_text("mine")
     with pytest.raises(Exception, match="full: exists and is not an empty folder"):
         bad(files, tmp_path, out=tmp_path / "full")
-    for numbers, message in (((0, 1, 1, 1), "--size must be at least 1"), ((8, 1, 1, 0), "--spp must be at least 1")):
+    for numbers, layout, message in (
+        ((0, 1, 1, 1), "blender", "--size must be at least 1"),
+        ((8, 1, 1, 0), "blender", "--spp must be at least 1"),
+        ((8, 1, 1, 1), "nerf", "--layout must be one of"),
+    ):
         with pytest.raises(Exception, match=message):
-            bad(files, tmp_path, settings=SynthSettings(*numbers))
+            bad(files, tmp_path, settings=SynthSettings(*numbers, layout=layout))
     (tmp_path / "more").mkdir()
     (tmp_path / "more/relight_blue.exr").write_bytes((files / "blue.exr").read_bytes())
     with pytest.raises(Exception, match="two maps are called blue"):

@@ -200,6 +200,7 @@ def test_made_data_turn_the_light_with_the_camera(ball, tmp_path):
     azimuths = [np.arctan2(*(turn @ pose[:3, 3])[1::-1]) for turn, pose in zip(turns, poses)]
     assert azimuths == pytest.approx([azimuths[0]] * len(azimuths), abs=1e-5)
     assert turn_to(poses[0], poses[0]) == pytest.approx(np.eye(3))
+    assert main([*words, "--out", str(tmp_path / "folders"), "--turntable", "--layout", "nerfactor"]) == 2
 
 
 def test_a_run_of_a_turntable_goes_to_its_end(data, tmp_path, capsys):

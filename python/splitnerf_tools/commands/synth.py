@@ -9,6 +9,7 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, examples
 from splitnerf.errors import InputError
 
+LAYOUTS = ("blender", "nerfactor")
 SHAPES = ("bowl", "mug", "box", "vase", "shell", "rings", "plinth", "mask")
 MATERIALS = ("matte", "glossy", "metal")
 
@@ -18,7 +19,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "synth",
         help="render a dataset with full truth from a GLB file or a built-in shape",
         description="Renders ASSET or a built-in shape, brought to the unit sphere, from cameras around it under the light MAP, "
-        "with true albedo, roughness, metallic, normals and relit views, as data that train and evaluate read.",
+        "with true albedo, roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
         epilog=examples(
             "splitnerf synth chair.glb --light studio.hdr --out data",
             "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",
@@ -46,6 +47,13 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--test", type=int, default=20, metavar="N", help="number of test views (default: 20)")
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
     parser.add_argument(
+        "--layout",
+        choices=LAYOUTS,
+        metavar="SET",
+        default="blender",
+        help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}",
+    )
+    parser.add_argument(
         "--turntable",
         action="store_true",
         help="the object turns before the camera, so that the light turns with the camera",
@@ -62,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.material and not args.shape:
         raise InputError("--material is that of a built-in shape; give --shape, or leave it out")
-    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.seed, args.turntable)
+    settings = SynthSettings(args.size, args.train, args.test, args.spp, args.layout, args.seed, args.turntable)
     with tempfile.TemporaryDirectory() as folder:
         asset = args.asset
         if args.shape:

@@ -124,7 +124,7 @@ def write_demo_dataset(
 ) -> Path:
     """Renders the demo scene and writes it as a dataset with truth.
 
-    The folder is in the form of :mod:`splitnerf_tools.synth.writer`, without relit views.
+    The folder is in the layout "blender" of :mod:`splitnerf_tools.synth.writer`, without relit views.
 
     Args:
         out: The folder to write to; made where it is missing.

@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from splitnerf_tools.synth.orbits import orbit, spiral
 from splitnerf_tools.synth.placement import write_placed_glb
-from splitnerf_tools.synth.writer import SceneWriter
+from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
 CAMERA_DISTANCE = 3.0233467  # three quarters of theirs: it frames the unit sphere
@@ -36,6 +36,7 @@ class SynthSettings:
         train: Number of train views.
         test: Number of test views.
         spp: Paths a pixel.
+        layout: One of :data:`splitnerf_tools.synth.writer.LAYOUTS`.
         seed: The seed of the renderings and of the first camera's azimuth.
         turntable: Whether the object turns before a camera that goes up and down alone, and the light with the camera.
     """
@@ -44,6 +45,7 @@ class SynthSettings:
     train: int = 100
     test: int = 20
     spp: int = 256
+    layout: str = "blender"
     seed: int = 0
     turntable: bool = False
 
@@ -54,6 +56,12 @@ class SynthSettings:
                 raise InputError(f"--{name} must be at least 1 and at most {most}, got {getattr(self, name)}")
         if self.seed < 0:
             raise InputError(f"--seed must not be negative, got {self.seed}")
+        if self.turntable and self.layout != "blender":
+            raise InputError(
+                f"--turntable: the layout {self.layout} has no word for the light's rotation; leave it out"
+            )
+        if self.layout not in LAYOUTS:
+            raise InputError(f"--layout must be one of {', '.join(LAYOUTS)}, got {self.layout}")
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
@@ -83,7 +91,7 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     names = [path.stem.removeprefix(PREFIX) for path in relight]
     if len(set(names)) < len(names):
         raise InputError(f"--relight: two maps are called {max(names, key=names.count)}; rename one")
-    writer = SceneWriter(out, CAMERA_ANGLE_X)
+    writer = SceneWriter(out, CAMERA_ANGLE_X, settings.layout)
     maps = [resized(read_environment(path)) for path in (light, *relight)]
     original = read_asset(asset)
     if any(any(material.emission) for material in original.materials):

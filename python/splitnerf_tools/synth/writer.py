@@ -1,6 +1,13 @@
-"""Writes rendered views as a dataset with its truth, in the form of NeRF-Blender: `transforms_{train,test}.json`, `{train,test}/r_000.png`;
-for test views also `_albedo.png`, `_orm.png` (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`; and
-`light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha, normals world space without the normal map.
+"""Writes rendered views as a dataset with its truth.
+
+Layouts:
+    blender     `transforms_{train,test}.json`, `{train,test}/r_000.png`; for test views also `_albedo.png`, `_orm.png`
+                (R = 1, G = roughness, B = metallic), `_normal.exr` and `_relit_<map>.png`.
+    nerfactor   a folder per view, `train_000`, `test_000`, with `rgba.png` and `metadata.json`; for test views also
+                `albedo.png`, `normal.png` and `rgba_<map>.png`.
+
+In the dataset's folder of each: `light.hdr`, `relight_<map>.hdr`, `mesh.ply`. Colours are sRGB with straight alpha (but
+the albedo of nerfactor is linear), normals world space without the normal map.
 """
 
 from __future__ import annotations
@@ -11,9 +18,11 @@ import numpy as np
 import trimesh
 from splitnerf.data.images import linear_to_srgb, read_radiance, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.layouts import view_folders
 from splitnerf.data.truth import PREFIX, relit_path
 from splitnerf.export.scene import write_mesh_ply
 
+LAYOUTS = ("blender", "nerfactor")
 Maps = dict[str, np.ndarray]
 
 
@@ -23,14 +32,15 @@ class SceneWriter:
     Args:
         root: The dataset's folder; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
+        layout: One of `LAYOUTS`.
 
     Raises:
         OSError: A file cannot be written (any method).
     """
 
-    def __init__(self, root: Path, camera_angle_x: float):
-        self.root, self.camera_angle_x = root, camera_angle_x
-        self._frames: dict[str, list[dict]] = {}
+    def __init__(self, root: Path, camera_angle_x: float, layout: str = "blender"):
+        self.root, self.camera_angle_x, self.layout = root, camera_angle_x, layout
+        self._views: dict[str, list[tuple[Path, dict]]] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
         """Writes an environment map.
@@ -59,13 +69,18 @@ class SceneWriter:
             pose: [4, 4] camera-to-world, OpenGL axes.
             maps: The maps of `AssetRenderer.render`: `radiance` and `alpha`; for test views also `albedo`, `roughness`,
                 `metallic` and `smooth_normal`.
-            light_turn: [3, 3] that of :class:`splitnerf.data.layouts.frame.Frame`.
+            light_turn: [3, 3] that of :class:`splitnerf.data.layouts.frame.Frame`, with layout `blender`.
         """
         image = self._image_path(split, index)
         write_image(image, straight_rgba(maps))
-        entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
-        entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
-        self._frames.setdefault(split, []).append(entry)
+        height, width = maps["alpha"].shape
+        if self.layout == "blender":
+            entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
+            entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
+        else:
+            entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
+            entry |= {"imw": width, "imh": height}
+        self._views.setdefault(split, []).append((image, entry))
         if split == "test":
             self._write_truth(image, maps)
 
@@ -75,15 +90,25 @@ class SceneWriter:
 
     def close(self) -> None:
         """Writes the poses, which complete the dataset."""
-        for split, frames in self._frames.items():
-            content = {"camera_angle_x": self.camera_angle_x, "frames": frames}
-            write_json(self.root / f"transforms_{split}.json", content)
+        for split, views in self._views.items():
+            if self.layout == "blender":
+                content = {"camera_angle_x": self.camera_angle_x, "frames": [entry for _, entry in views]}
+                write_json(self.root / f"transforms_{split}.json", content)
+                continue
+            for image, entry in views:
+                write_json(image.with_name(view_folders.METADATA), entry)
 
     def _image_path(self, split: str, index: int) -> Path:
-        return self.root / split / f"r_{index:03d}.png"
+        if self.layout == "blender":
+            return self.root / split / f"r_{index:03d}.png"
+        return self.root / f"{split}_{index:03d}" / view_folders.PHOTO
 
     def _write_truth(self, image: Path, maps: Maps) -> None:
         alpha, normal = maps["alpha"][..., None], maps["smooth_normal"]
+        if self.layout != "blender":
+            write_image(image.with_name("albedo.png"), np.concatenate([maps["albedo"], alpha], axis=-1))
+            write_image(image.with_name("normal.png"), np.concatenate([0.5 * normal + 0.5, alpha], axis=-1))
+            return
         albedo = np.concatenate([linear_to_srgb(maps["albedo"]), alpha], axis=-1)
         orm = np.stack([maps["alpha"] > 0, maps["roughness"], maps["metallic"], maps["alpha"]], axis=-1)
         write_image(image.with_name(f"{image.stem}_albedo.png"), albedo)

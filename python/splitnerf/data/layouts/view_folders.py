@@ -51,6 +51,11 @@ def parse_matrix(text: object) -> object:
     return [numbers[4 * row : 4 * row + 4] for row in range(4)] if len(numbers) == 16 else numbers
 
 
+def format_matrix(pose) -> str:
+    """The inverse of `parse_matrix`, for a [4, 4] array."""
+    return ",".join(repr(float(value)) for row in pose for value in row)
+
+
 def _read_view(folder: Path) -> Frame:
     path, image_path = folder / METADATA, folder / PHOTO
     content = read_json(path, "cam_transform_mat")
