@@ -132,5 +132,7 @@ def test_it_runs_and_goes_on(data, tmp_path, capsys):
     capsys.readouterr()
     assert main([*command, "--set", "mask_weight=0.5"]) == BAD_INPUT
     assert "other settings" in capsys.readouterr().err
+    assert main([command[0], str(tmp_path / "none"), *command[1:]]) == BAD_INPUT  # before it trains
+    assert "none: no such folder" in capsys.readouterr().err
     assert main(["ablate", "--list"]) == DONE
     assert "no metal regulariser: losses.metal_weight = 0.0" in capsys.readouterr().out

@@ -1,12 +1,15 @@
 """splitnerf batch, without Ray: names, options, shares, the table, processes, and what follows from how they end."""
 
 import json
+import os
 import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from splitnerf.cli import BAD_INPUT, build_parser, main
@@ -128,6 +131,23 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
     assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == BAD_INPUT
     assert capsys.readouterr().err == "splitnerf: batch needs the package ray: pip install 'splitnerf[batch]'\n"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "interrupted"),
+        (Exception("The node timed out. Why"), 1, "Ray does not start here (The n"),
+    ],
+)
+def test_ray_that_does_not_start_is_one_line_and_leaves_no_folder(tmp_path, monkeypatch, capsys, error, code, said):
+    ray = Mock(__spec__=ModuleSpec("ray", None), **{"init.side_effect": error})
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == code
+    error = capsys.readouterr().err
+    assert error.startswith(f"splitnerf: {said}") and len(error.splitlines()) == 1
+    assert not Path(ray.init.call_args.kwargs["_temp_dir"]).exists() and ray.shutdown.called
 
 
 # ---- shares ----

@@ -184,6 +184,16 @@ def test_the_demo_renders_into_no_folder_of_the_users(mine, capsys):
     assert (mine / "data/light.hdr").read_text() == "mine"
 
 
+@pytest.mark.parametrize("name", ["ablation.md", "prefilter.png", "batch.md", "logs/ray.log"])
+def test_tables_and_logs_replace_nothing_else(data, mine, capsys, name):
+    (mine / name).parent.mkdir(exist_ok=True)
+    (mine / name).write_text("mine")
+    before = contents(mine)
+    words = {"ablation.md": ("ablate", data), "prefilter.png": ("bench", "prefilter")}.get(name, ("batch", data))
+    assert "would be replaced" in refused(capsys, *words, "--out", mine)
+    assert contents(mine) == before
+
+
 def test_frames_of_a_video_are_kept_for_it_alone(tmp_path):
     """Another video, another number of frames or a changed file is another purpose."""
     (tmp_path / "a.mp4").write_text("a")
