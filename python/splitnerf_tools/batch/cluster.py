@@ -19,7 +19,7 @@ from typing import TextIO
 from splitnerf.errors import InputError, plain
 from splitnerf.files import own_folder
 from splitnerf.memory import memory_bytes
-from splitnerf.progress import ended_by_signals
+from splitnerf.progress import Interrupt
 
 from splitnerf_tools.batch.scenes import LOGS
 from splitnerf_tools.doctor.machine import GIB, TRAINING_GIB, processors
@@ -130,10 +130,11 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     with open(out / LOGS / "ray.log", "a", encoding="utf-8", errors="backslashreplace") as log:
         with redirect_stdout(log), redirect_stderr(log):
             try:
-                with _compiled_words_to(log):
+                with _compiled_words_to(log), Interrupt() as interrupt:  # Ray crashes where its start is interrupted
                     _start(ray, place) if place else _connect(ray, address)
-                with ended_by_signals():  # Ray replaced the handler of SIGTERM
-                    yield ray
+                if interrupt.asked:
+                    raise KeyboardInterrupt
+                yield ray
             finally:
                 ray.shutdown()
                 if place is not None:
