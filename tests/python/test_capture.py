@@ -4,9 +4,11 @@ import fcntl
 import io
 import json
 import sqlite3
+import struct
 import subprocess
 import sys
 import threading
+import zlib
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
@@ -330,12 +332,35 @@ def test_two_photos_are_too_few(tmp_path, capsys):
     assert said.endswith("holds 2 different photos, fewer than 3; take 30 or more")
 
 
-@pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])
+HUGE = b"IHDR" + struct.pack(">IIIB", 20000, 20000, 1 << 24, 0)
+HUGE = b"\x89PNG\r\n\x1a\n\0\0\0\r" + HUGE + struct.pack(">II", zlib.crc32(HUGE), 0) + b"IDAT"
+
+
+@pytest.mark.parametrize(
+    "content, told",
+    [
+        (b"", "no photo that can be read"),
+        (None, "holds no photos"),
+        pytest.param(HUGE, "more than 178 megapixels", id="huge"),
+    ],
+)
 def test_bad_photos_are_named(tmp_path, content, told):
     if content is not None:
         (tmp_path / "a.jpg").write_bytes(content)
     with pytest.raises(InputError, match=told):
         find_photographs(tmp_path)
+
+
+@pytest.mark.parametrize(("name", "told"), [("v.mp4", "is no video"), ("photos", "holds 1 different photos")])
+def test_libraries_say_nothing_beside_the_program(tmp_path, name, told):
+    """Of a video that is none, and of EXIF data that are cut short."""
+    (tmp_path / "v.mp4").write_text("no video")
+    (tmp_path / "photos").mkdir()
+    exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x05\x01\x12\0\x03\0\0\0\x10\xff\xff\xff\0"
+    Image.new("RGB", (40, 30)).save(tmp_path / "photos/a.jpg", exif=exif)
+    command = [sys.executable, "-m", "splitnerf", "prepare", name, "--out", "out"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stderr
+    assert told in said and all(line.startswith("splitnerf: ") for line in said.splitlines()), said
 
 
 def test_the_sharpest_frames_of_a_video(tmp_path):
