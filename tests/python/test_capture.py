@@ -12,6 +12,7 @@ import zlib
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -349,6 +350,43 @@ def test_bad_photos_are_named(tmp_path, content, told):
         (tmp_path / "a.jpg").write_bytes(content)
     with pytest.raises(InputError, match=told):
         find_photographs(tmp_path)
+
+
+def test_a_false_raw_photo_is_named(tmp_path, monkeypatch):
+    """Whether rawpy is there or not."""
+
+    class LibRawError(Exception):
+        pass
+
+    rawpy = SimpleNamespace(LibRawError=LibRawError, imread=Mock(side_effect=LibRawError(b"Unsupported")))
+    (tmp_path / "a.dng").write_bytes(b"no raw photo")
+    for module, told in ((rawpy, "a.dng: is no raw photo that can be read"), (None, "a.dng: raw photos need")):
+        monkeypatch.setitem(sys.modules, "rawpy", module)
+        with pytest.raises(InputError, match=told):
+            find_photographs(tmp_path)
+
+
+@pytest.mark.parametrize("size", [(1, 3000), (3000, 1), (1, 1)])
+def test_a_photo_may_be_a_line(tmp_path, size):
+    Image.new("RGB", size, "red").save(tmp_path / "a.png")
+    (photo,) = find_photographs(tmp_path)
+    assert (photo.width, photo.height) == size and sharpness(read_upright(photo.path)) < 1e-6
+
+
+def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
+    """And is a part of what earlier work is kept for."""
+    seeds = []
+    (tmp_path / "photos").mkdir()
+    for i, pixels in enumerate(np.random.default_rng(0).integers(0, 255, (4, 40, 60, 3), np.uint8)):
+        Image.fromarray(pixels).save(tmp_path / f"photos/{i}.png")
+    found = SimpleNamespace(names=["0", "1", "2", "3"])
+    monkeypatch.setattr(preparation, "reconstruct", lambda *given: seeds.append(given[3]) or found)
+    monkeypatch.setattr(preparation, "settle", lambda found, seed: seeds.append(seed) or 1 / 0)
+    prints = set()
+    for seed in (7, 8):
+        main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "out"), "--seed", str(seed)])
+        prints.add((tmp_path / "out/work/.splitnerf").read_text())
+    assert seeds == [7, 7, 8, 8] and len(prints) == 2
 
 
 @pytest.mark.parametrize(("name", "told"), [("v.mp4", "is no video"), ("photos", "holds 1 different photos")])
