@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -134,19 +135,14 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (KeyboardInterrupt, 130, "interrupted"),
-        (Exception("The node timed out. Why"), 1, "Ray does not start here (The n"),
-    ],
+    ("error", "said"), [(KeyboardInterrupt, "interrupted"), (OSError("Why"), "Ray does not start")]
 )
-def test_ray_that_does_not_start_is_one_line_and_leaves_no_folder(tmp_path, monkeypatch, capsys, error, code, said):
+def test_ray_that_does_not_start_is_one_line(tmp_path, monkeypatch, capsys, error, said):
     ray = Mock(__spec__=ModuleSpec("ray", None), **{"init.side_effect": error})
     monkeypatch.setitem(sys.modules, "ray", ray)
     monkeypatch.setattr(os, "environ", dict(os.environ))
-    assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == code
-    error = capsys.readouterr().err
-    assert error.startswith(f"splitnerf: {said}") and len(error.splitlines()) == 1
+    main(["batch", str(tmp_path), "--out", str(tmp_path / "out")])
+    assert re.fullmatch(f"splitnerf: {said}.*\n", capsys.readouterr().err)
     assert not Path(ray.init.call_args.kwargs["_temp_dir"]).exists() and ray.shutdown.called
 
 

@@ -156,7 +156,7 @@ def test_only_files_are_replaced(data, done, mine, capsys):
     for name in ("index.html", "chair_evaluation.json"):
         (mine / name).write_text("mine")
     shutil.copy(done / "mesh.glb", mine / "chair.glb")
-    assert "index.html: is no earlier page" in refused(capsys, "inspect", data, "--out", mine / "index.html")
+    assert "index.html: is not an earlier result" in refused(capsys, "inspect", data, "--out", mine / "index.html")
     said = refused(capsys, "evaluate", mine / "chair.glb", "--data", data)
     assert "chair_evaluation.json: is not an earlier result" in said
     assert [(mine / name).read_text() for name in ("index.html", "chair_evaluation.json")] == ["mine"] * 2

@@ -108,8 +108,8 @@ def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
     where two options exclude each other, or a file would be lost; the message names them."""
     from splitnerf.evaluate.published.scoring import holds_published, published_path
-    from splitnerf.evaluate.score_table import holds_table
     from splitnerf.evaluate.scoring import evaluation_path, holds_evaluation, is_asset
+    from splitnerf.files import refuse_others
     from splitnerf.run_folder import data_of
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
@@ -140,10 +140,11 @@ def check_usage(args: argparse.Namespace) -> None:
     holds = holds_published if args.protocol else holds_evaluation
     assets = [target for target in args.targets if is_asset(target) and args.data]  # a run's scores are in its folder
     beside = [published_path(asset, args.protocol) if args.protocol else evaluation_path(asset) for asset in assets]
-    outs = [("out", path, holds) for path in ([args.out] if args.out else beside)]
-    for name, path, is_ours in (("table", args.table, holds_table), *outs):
-        if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
-            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --{name}")
+    if args.table:
+        refuse_others(args.table, b"| scene |", option="--table")
+    for path in [args.out] if args.out else beside:
+        if path.is_file() and path.stat().st_size and not holds(path):
+            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --out")
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:

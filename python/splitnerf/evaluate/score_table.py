@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 # Name, title, format, and keys in evaluation.json.
 COLUMNS = (
@@ -49,12 +48,6 @@ def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
     if len(rows) > 1:
         lines.append(["**mean**"] + [_mean([v[key] for _, v in rows], text) for key, _, text, _ in COLUMNS])
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
-
-
-def holds_table(path: Path) -> bool:
-    """Whether a file is a table of scores."""
-    with open(path, "rb") as file:
-        return file.read(9) == b"| scene |"
 
 
 def _cell(value: float | None, text: str) -> str:
