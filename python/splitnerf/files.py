@@ -143,6 +143,15 @@ def own_folder(folder: Path, purpose: str = "") -> None:
         temporary.write_text(purpose, encoding="utf-8")
 
 
+def refuse_others(result: Path, words: bytes, *beside: Path, option: str = "--out") -> None:
+    """Raises InputError where a result, or a file written beside it, would replace another file: one is there, and the
+    result does not have its `words` near its beginning."""
+    begin = result.open("rb").read(4096) if result.is_file() else b""
+    for path in (result, *beside):
+        if os.path.lexists(path) and not (words in begin and path.is_file()):
+            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another {option}")
+
+
 def is_file(path: Path) -> bool:
     """Whether a file exists at the path; false for impossible names, such as names that are too long."""
     try:

@@ -6,12 +6,15 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 from typing import TypeVar
 
 from tqdm import tqdm
 
+LOADER, AGAIN = "<frozen importlib._bootstrap>", 0.05  # what loads modules; seconds until a signal comes again
 LINE_EVERY = 10.0  # seconds between lines where the output is not a terminal
 Item = TypeVar("Item")
 
@@ -25,17 +28,30 @@ def ending_signals() -> list[signal.Signals]:
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Within the block every signal to end raises KeyboardInterrupt, so that nothing is left half-written. Threads
+    """Within the block every signal to end raises KeyboardInterrupt, so that nothing is left half-written; where a
+    module is being loaded, soon after: it might take the exception for a missing library, or stay broken. Threads
     beside the main one have no signals."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    previous = {s: signal.signal(s, signal.default_int_handler) for s in ending_signals()}
+    outside = _loads_of_modules(sys._getframe())
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if _loads_of_modules(frame) == outside:
+            raise KeyboardInterrupt
+        threading.Timer(AGAIN, signal.pthread_kill, (threading.main_thread().ident, number)).start()
+
+    previous = {s: signal.signal(s, interrupt) for s in ending_signals()}
     try:
         yield
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+def _loads_of_modules(frame: FrameType | None) -> int:
+    """How many calls on the stack load a module."""
+    return sum(inner.f_code.co_filename == LOADER for inner, _ in traceback.walk_stack(frame))
 
 
 class Interrupt:

@@ -133,5 +133,8 @@ def test_it_runs_and_goes_on(data, tmp_path, capsys):
     assert all(np.isfinite(float(r["novel_view"])) for r in rows)
     capsys.readouterr()
     assert "other settings" in refused(capsys, *command, "--set", "mask_weight=0.5")
+    assert "none: no such folder" in refused(
+        capsys, command[0], str(tmp_path / "none"), *command[1:]
+    )  # before it trains
     assert main(["ablate", "--list"]) == DONE
     assert "no metal regulariser: losses.metal_weight = 0.0" in capsys.readouterr().out

@@ -10,6 +10,7 @@ import threading
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
@@ -338,6 +339,46 @@ def test_bad_photos_are_named(tmp_path, content, told):
         (tmp_path / "a.jpg").write_bytes(content)
     with pytest.raises(InputError, match=told):
         find_photographs(tmp_path)
+
+
+def test_a_false_raw_photo_is_named(tmp_path, monkeypatch):
+    """Whether rawpy is there or not."""
+    error = type("LibRawError", (Exception,), {})
+    (tmp_path / "a.dng").write_bytes(b"no raw photo")
+    rawpy = SimpleNamespace(LibRawError=error, imread=Mock(side_effect=error(b"Unsupported")))
+    for module, told in ((rawpy, "a.dng: is no raw photo that can be read"), (None, "a.dng: raw photos need")):
+        monkeypatch.setitem(sys.modules, "rawpy", module)
+        with pytest.raises(InputError, match=told):
+            find_photographs(tmp_path)
+
+
+@pytest.mark.parametrize("size", [(1, 3000), (3000, 1), (1, 1)])
+def test_a_photo_may_be_a_line(tmp_path, size):
+    Image.new("RGB", size, "red").save(tmp_path / "a.png")
+    (photo,) = find_photographs(tmp_path)
+    assert (photo.width, photo.height) == size and sharpness(read_upright(photo.path)) < 1e-6
+
+
+def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
+    seeds, parts = [], {"_photographs": [], "_sorted_out": ([], {}), "_upright_copies": [], "_without_camera": {}}
+    for name, result in parts.items():
+        monkeypatch.setattr(preparation, name, lambda *_, result=result: result)
+    monkeypatch.setattr(preparation, "reconstruct", lambda *given: seeds.append(given[3]) or Mock())
+    monkeypatch.setattr(preparation, "settle", lambda found, seed: seeds.append(seed) or 1 / 0)
+    main(["prepare", str(tmp_path), "--out", str(tmp_path / "out"), "--seed", "7"])
+    assert seeds == [7, 7]
+
+
+@pytest.mark.parametrize(("name", "told"), [("v.mp4", "is no video"), ("photos", "holds 1 different photos")])
+def test_libraries_say_nothing_beside_the_program(tmp_path, name, told):
+    """Of a video that is none, and of EXIF data that are cut short."""
+    (tmp_path / "v.mp4").write_text("no video")
+    (tmp_path / "photos").mkdir()
+    exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x05\x01\x12\0\x03\0\0\0\x10\xff\xff\xff\0"
+    Image.new("RGB", (40, 30)).save(tmp_path / "photos/a.jpg", exif=exif)
+    command = [sys.executable, "-m", "splitnerf", "prepare", name, "--out", "out"]
+    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stderr
+    assert told in said and all(line.startswith("splitnerf: ") for line in said.splitlines()), said
 
 
 def test_the_sharpest_frames_of_a_video(tmp_path):

@@ -270,6 +270,16 @@ def test_what_a_file_does_not_hold_costs_more(path):
     assert asked == [8 * 16 * 3]
 
 
+def test_few_bytes_do_not_ask_for_much_work(path):
+    """A mesh of 800 primitives, placed 800 times."""
+    gltf = Gltf()
+    mesh = gltf.mesh(*[gltf.primitive()] * 800)
+    for _ in range(800):
+        gltf.node(mesh=mesh)
+    with pytest.raises(InputError, match="unpacks to more than its size makes likely"):
+        read_asset(gltf.write(path))
+
+
 def test_many_nodes_are_told_of(path, capsys, monkeypatch):
     gltf = triangle()
     gltf.json["nodes"] += [{}, {}]

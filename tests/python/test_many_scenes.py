@@ -1,12 +1,16 @@
 """splitnerf batch, without Ray: names, options, shares, the table, processes, and what follows from how they end."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from splitnerf.cli import BAD_INPUT, build_parser, main
@@ -128,6 +132,18 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
     assert main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == BAD_INPUT
     assert capsys.readouterr().err == "splitnerf: batch needs the package ray: pip install 'splitnerf[batch]'\n"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"), [(KeyboardInterrupt, "interrupted"), (OSError("Why"), "Ray does not start")]
+)
+def test_ray_that_does_not_start_is_one_line(tmp_path, monkeypatch, capsys, error, said):
+    ray = Mock(__spec__=ModuleSpec("ray", None), **{"init.side_effect": error})
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    main(["batch", str(tmp_path), "--out", str(tmp_path / "out")])
+    assert re.fullmatch(f"splitnerf: {said}.*\n", capsys.readouterr().err)
+    assert not Path(ray.init.call_args.kwargs["_temp_dir"]).exists() and ray.shutdown.called
 
 
 # ---- shares ----

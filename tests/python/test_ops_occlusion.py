@@ -57,6 +57,7 @@ def test_bad_meshes_raise():
     for bad_vertices, bad_faces in (
         (vertices, faces + 1),
         (vertices, faces - 1),
+        (vertices, faces + (1 << 32)),
         (vertices, faces[:0]),
         (vertices[:0], faces),
         (vertices * np.nan, faces),

@@ -156,7 +156,7 @@ def test_only_files_are_replaced(data, done, mine, capsys):
     for name in ("index.html", "chair_evaluation.json"):
         (mine / name).write_text("mine")
     shutil.copy(done / "mesh.glb", mine / "chair.glb")
-    assert "index.html: is no earlier page" in refused(capsys, "inspect", data, "--out", mine / "index.html")
+    assert "index.html: is not an earlier result" in refused(capsys, "inspect", data, "--out", mine / "index.html")
     said = refused(capsys, "evaluate", mine / "chair.glb", "--data", data)
     assert "chair_evaluation.json: is not an earlier result" in said
     assert [(mine / name).read_text() for name in ("index.html", "chair_evaluation.json")] == ["mine"] * 2
@@ -182,6 +182,16 @@ def test_the_demo_renders_into_no_folder_of_the_users(mine, capsys):
     for more in ((), ("--overwrite",)):
         assert "data: holds other files" in refused(capsys, "demo", "--out", mine, *more)
     assert (mine / "data/light.hdr").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["ablation.md", "prefilter.png", "batch.md", "logs/ray.log"])
+def test_tables_and_logs_replace_nothing_else(data, mine, capsys, name):
+    (mine / name).parent.mkdir(exist_ok=True)
+    (mine / name).write_text("mine")
+    before = contents(mine)
+    words = {"ablation.md": ("ablate", data), "prefilter.png": ("bench", "prefilter")}.get(name, ("batch", data))
+    assert "would be replaced" in refused(capsys, *words, "--out", mine)
+    assert contents(mine) == before
 
 
 def test_frames_of_a_video_are_kept_for_it_alone(tmp_path):

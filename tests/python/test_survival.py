@@ -97,6 +97,19 @@ def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypa
     assert train(data, tmp_path / "run", "--resume") == DONE
 
 
+def test_a_module_that_is_being_loaded_does_not_swallow_a_signal(tmp_path, monkeypatch):
+    """As some do that take any exception for a missing library."""
+    (tmp_path / "swallower.py").write_text(
+        "import signal\ntry: signal.raise_signal(2)\nexcept BaseException: loaded = 0"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt), ended_by_signals():
+        import swallower
+
+        time.sleep(5.0)
+    assert not hasattr(swallower, "loaded")
+
+
 def test_nohup_is_left_to_ignore():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:

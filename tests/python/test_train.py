@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 from types import SimpleNamespace
 
@@ -12,6 +13,8 @@ from splitnerf.cli import BAD_INPUT, DONE, main
 from splitnerf.cli.common import Stages
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
+from splitnerf.data.gltf import read_asset
+from splitnerf.data.images import read_image, write_image
 from splitnerf.devices import same_bits
 from splitnerf.errors import InputError
 from splitnerf.ops.sdf import rounded
@@ -48,6 +51,15 @@ def test_a_run_holds_every_file_and_evaluate_repeats_its_scores(data_with_mesh, 
     kept, other = (run / "evaluation.json").read_bytes(), tmp_path / "other.json"
     assert main(["evaluate", str(run), "--data", str(data), "--views", "1", "--out", str(other)]) == DONE
     assert json.loads(other.read_text())["views"] == 1 and (run / "evaluation.json").read_bytes() == kept
+
+
+def test_photos_that_are_all_dark_make_an_asset(data, tmp_path):
+    dark = shutil.copytree(data, tmp_path / "dark")
+    for path in dark.glob("train/*.png"):
+        write_image(path, read_image(path) * np.float32([0, 0, 0, 1]))
+    assert train(dark, tmp_path / "run", "--steps", "8") == DONE
+    assert len(read_asset(tmp_path / "run/mesh.glb").triangles) > 0  # and no coordinate is NaN
+    assert np.isfinite(read_image(tmp_path / "run/environment.exr")).all()
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True}, {"sparse_steps": True, "table_dtype": "float16"}])

@@ -99,8 +99,8 @@ def run(args: argparse.Namespace) -> int:
 def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
     where two options exclude each other, or a file would be lost; the message names them."""
-    from splitnerf.evaluate.score_table import holds_table
     from splitnerf.evaluate.scoring import evaluation_path, holds_evaluation, is_asset
+    from splitnerf.files import refuse_others
     from splitnerf.run_folder import data_of
 
     given = [name for name in NEEDS_DATA if getattr(args, name) is not None]
@@ -121,10 +121,11 @@ def check_usage(args: argparse.Namespace) -> None:
     if args.sheet is not None and args.sheet.exists():
         raise InputError(f"{args.sheet}: exists, and would be replaced; give another --sheet")
     assets = [target for target in args.targets if is_asset(target) and args.data]  # a run's scores are in its folder
-    outs = [("out", path, holds_evaluation) for path in ([args.out] if args.out else map(evaluation_path, assets))]
-    for name, path, is_ours in (("table", args.table, holds_table), *outs):
-        if path is not None and path.is_file() and path.stat().st_size and not is_ours(path):
-            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --{name}")
+    if args.table:
+        refuse_others(args.table, b"| scene |", option="--table")
+    for path in [args.out] if args.out else map(evaluation_path, assets):
+        if path.is_file() and path.stat().st_size and not holds_evaluation(path):
+            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --out")
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,8 +14,6 @@ from PIL import ExifTags, Image, ImageCms
 
 from splitnerf import ops
 from splitnerf.errors import note_once, plain
-
-warnings.filterwarnings("ignore", category=Image.DecompressionBombWarning)  # who reads the pixels checks their number
 
 ROWS = 256  # of a photo that are converted at once
 # Chromaticities x, y of red, green, blue and white.

@@ -14,7 +14,7 @@ import torch
 from torch.nn.functional import interpolate
 
 from splitnerf.data.environment import read_surroundings
-from splitnerf.data.frames import read_frames, what_is_in
+from splitnerf.data.frames import read_frames
 from splitnerf.data.images import area_average, read_image
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.layouts.frame import Frame
@@ -248,8 +248,6 @@ def load_dataset(
         raise InputError(f"{root}: no split '{split}'; use train or test")
     if downscale < 1 or int(downscale) != downscale:
         raise InputError(f"{root}: downscale must be a whole number of at least 1, got {downscale}")
-    if not root.is_dir():
-        raise InputError(f"{root}: {what_is_in(root) or 'no such folder; give the folder that holds the data'}")
     downscale = int(downscale)
     frames, origin = read_frames(root, split, reading)
     _check_once(frames)

@@ -30,7 +30,7 @@ def read_frames(root: Path, split: str, reading: Reading = Reading()) -> tuple[l
     pose or no lens."""
     layout = layout_of(root)
     if layout is None:
-        if meant := what_is_in(root):
+        if meant := what_is_in(root) or (not root.is_dir() and "no such folder; give the folder that holds the data"):
             raise InputError(f"{root}: {meant}")
         raise InputError(
             f"{root}: has neither transforms_{split}.json nor transforms.json, nor view folders like train_000, nor "

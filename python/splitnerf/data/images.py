@@ -8,6 +8,7 @@ import re
 import shutil
 import struct
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import product
@@ -25,6 +26,7 @@ from splitnerf.data.colours import ALIKE, REC709, to_srgb
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path, is_file
 
+warnings.filterwarnings("ignore", module=r"PIL\.")  # of Pillow; damage is told of by the program
 oiio.attribute("exr_threads", -1)  # no threads of its own, for which a fork of this program would wait for ever
 
 JPEG_QUALITY = 95

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 # Name, title, format, and keys in evaluation.json.
 COLUMNS = (
@@ -70,12 +69,6 @@ def table_of_lights(evaluation: dict, label: str) -> str:
     widths = [max(map(len, column)) for column in zip(*lines)]
     shown = ["  ".join([name.ljust(widths[0]), *map(str.rjust, cells, widths[1:])]) for name, *cells in lines]
     return "\n".join([*shown, SOURCE])
-
-
-def holds_table(path: Path) -> bool:
-    """Whether a file is a table of scores."""
-    with open(path, "rb") as file:
-        return file.read(9) == b"| scene |"
 
 
 def _cell(value: float | None, text: str) -> str:

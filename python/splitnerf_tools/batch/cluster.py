@@ -17,8 +17,9 @@ from types import ModuleType
 from typing import TextIO
 
 from splitnerf.errors import InputError, plain
+from splitnerf.files import own_folder
 from splitnerf.memory import memory_bytes
-from splitnerf.progress import ended_by_signals
+from splitnerf.progress import Interrupt
 
 from splitnerf_tools.batch.scenes import LOGS
 from splitnerf_tools.doctor.machine import GIB, TRAINING_GIB, processors
@@ -111,7 +112,8 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
         out: The batch's folder.
 
     Raises:
-        InputError: Ray is not installed, or no cluster answers.
+        InputError: Ray is not installed or cannot be loaded, no cluster answers, or the logs would replace other files.
+        RuntimeError: Ray does not start here.
     """
     if find_spec("ray") is None:
         raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")
@@ -119,33 +121,24 @@ def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
     # `ray start` wrote it, and its cluster asks for it
     if address and Path("~/.ray/auth_token").expanduser().is_file():
         os.environ.setdefault("RAY_AUTH_MODE", "token")
-    import ray
-
-    (out / LOGS).mkdir(exist_ok=True)
-    own = None if address else own_folder()
+    try:
+        import ray
+    except ImportError as error:
+        raise InputError(f"the package ray cannot be loaded ({plain(str(error))}); install it again") from None
+    own_folder(out / LOGS, "batch")
+    place = None if address else ray_folder()
     with open(out / LOGS / "ray.log", "a", encoding="utf-8", errors="backslashreplace") as log:
         with redirect_stdout(log), redirect_stderr(log):
             try:
-                with _compiled_words_to(log):
-                    if own is None:
-                        _connect(ray, address)
-                    else:
-                        ray.init(
-                            address="local",
-                            num_cpus=processors(),
-                            object_store_memory=OBJECT_STORE,
-                            include_dashboard=False,
-                            logging_level="error",
-                            log_to_driver=False,
-                            _temp_dir=own,
-                            _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
-                        )
-                with ended_by_signals():  # Ray replaced the handler of SIGTERM
-                    yield ray
+                with _compiled_words_to(log), Interrupt() as interrupt:  # Ray crashes where its start is interrupted
+                    _start(ray, place) if place else _connect(ray, address)
+                if interrupt.asked:
+                    raise KeyboardInterrupt
+                yield ray
             finally:
                 ray.shutdown()
-                if own is not None:
-                    remove_folder(own)
+                if place is not None:
+                    remove_folder(place)
 
 
 def machines_of(ray: ModuleType) -> list[dict[str, float]]:
@@ -165,7 +158,26 @@ def _compiled_words_to(log: TextIO) -> Iterator[None]:
         os.close(kept)
 
 
+def _start(ray: ModuleType, place: str) -> None:
+    """Starts Ray on this machine, its files in a folder."""
+    try:
+        ray.init(
+            address="local",
+            num_cpus=processors(),
+            object_store_memory=OBJECT_STORE,
+            include_dashboard=False,
+            logging_level="error",
+            log_to_driver=False,
+            _temp_dir=place,
+            _memory=int(SHARE_OF_FREE * memory_bytes()[1]),
+        )
+    except Exception as error:  # of many kinds; on a busy machine Ray's own patience ends
+        why = plain(str(error).strip()).partition(". ")[0]
+        raise RuntimeError(f"Ray does not start here ({why}); repeat the command when the machine is free") from None
+
+
 def _connect(ray: ModuleType, address: str) -> None:
+    """Connects to a cluster."""
     host, _, port = address.rpartition(":")
     try:
         if port.isdigit():  # Ray itself would try for minutes
@@ -186,7 +198,7 @@ def remove_folder(folder: str) -> None:
         time.sleep(0.1)
 
 
-def own_folder() -> str:
+def ray_folder() -> str:
     """A private folder with a short name for Ray's sockets and logs."""
     place = tempfile.gettempdir()
     if len(place) > LONGEST_FOLDER - len("/sn-12345678"):

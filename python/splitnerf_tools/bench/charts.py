@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
 
 from splitnerf_tools.bench.provenance import header, provenance
@@ -88,23 +87,15 @@ class Result:
 
 
 def write_result(result: Result, out: Path) -> list[Path]:
-    """Writes NAME.md, and where there are charts NAME.csv and NAME.png.
-
-    Returns:
-        The files.
-
-    Raises:
-        InputError: matplotlib is missing.
-    """
-    out.mkdir(parents=True, exist_ok=True)
+    """Writes NAME.md, and where there are charts NAME.csv and NAME.png; returns the files."""
     facts = provenance(result.sources)
     files = [out / f"{result.name}.md"]
+    with atomic_path(files[0]) as temporary:  # first: it says whose the others are
+        temporary.write_text(markdown(result, facts))
     if result.charts:
         files += [out / f"{result.name}.csv", out / f"{result.name}.png"]
         write_csv(files[1], facts, csv_rows(result.charts))
         draw(result, files[2])
-    with atomic_path(files[0]) as temporary:
-        temporary.write_text(markdown(result, facts))
     return files
 
 
@@ -151,15 +142,9 @@ def error_range(chart: Chart) -> tuple[float, float]:
 
 
 def draw(result: Result, path: Path) -> None:
-    """All charts in one picture, both axes logarithmic; a star marks the default, a line the front.
+    """All charts in one picture, both axes logarithmic; a star marks the default, a line the front."""
+    from matplotlib.figure import Figure
 
-    Raises:
-        InputError: matplotlib is missing.
-    """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError("the charts need matplotlib: pip install 'splitnerf[bench]'") from error
     columns = min(COLUMNS, len(result.charts))
     rows = -(-len(result.charts) // columns)
     names = list(dict.fromkeys(p.series for chart in result.charts for p in chart.points))

@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from splitnerf.errors import CheckFailed
+from splitnerf.errors import CheckFailed, InputError
+from splitnerf.files import locked, refuse_others
 from torch import Tensor
 
 from splitnerf_tools.bench.charts import Chart, Point, write_result
@@ -134,20 +136,25 @@ def run_benchmarks(modules: Sequence[str], quick: bool, out: Path, show: Callabl
     Args:
         modules: The names of modules, each with ``run(quick, rounds)``.
         quick: Whether to use small inputs and few rounds, which takes minutes in all.
-        out: The folder of the results; created if missing.
+        out: The folder of the results; created if missing. Only earlier results are replaced there.
         show: A function called with each line.
 
     Raises:
         CheckFailed: An operator's results are wrong.
-        InputError: matplotlib is missing.
+        InputError: matplotlib is missing, or the folder cannot take the results.
     """
+    if find_spec("matplotlib") is None:
+        raise InputError("the charts need matplotlib: pip install 'splitnerf[bench]'")
     files = []
-    for module in modules:
-        result = importlib.import_module(module).run(quick, QUICK_ROUNDS if quick else ROUNDS)
-        result.findings.extend(dict.fromkeys(LEFT_OUT))
-        LEFT_OUT.clear()
-        files += write_result(result, out)
-        show(result.title)
-        for finding in result.findings:
-            show(f"  {finding}")
+    with locked(out):
+        for name in (module.rpartition(".")[2] for module in modules):
+            refuse_others(out / f"{name}.md", b"; measures `", out / f"{name}.csv", out / f"{name}.png")
+        for module in modules:
+            result = importlib.import_module(module).run(quick, QUICK_ROUNDS if quick else ROUNDS)
+            result.findings.extend(dict.fromkeys(LEFT_OUT))
+            LEFT_OUT.clear()
+            files += write_result(result, out)
+            show(result.title)
+            for finding in result.findings:
+                show(f"  {finding}")
     return files

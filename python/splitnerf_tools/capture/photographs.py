@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +17,13 @@ from splitnerf.data.colours import to_srgb
 from splitnerf.errors import InputError, note_once, plain
 from splitnerf.files import atomic_path
 
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # silence: what cannot be read is told of by the program
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
-MAX_PIXELS = 200_000_000
+MAX_PIXELS = 2 * Image.MAX_IMAGE_PIXELS  # of Pillow
 T = Image.Transpose
 UPRIGHT = (T.FLIP_LEFT_RIGHT, T.ROTATE_180, T.FLIP_TOP_BOTTOM, T.TRANSPOSE, T.ROTATE_270, T.TRANSVERSE, T.ROTATE_90)
 TURNS = dict(enumerate(UPRIGHT, start=2))  # what turns a photo upright, by its EXIF orientation
@@ -176,10 +178,10 @@ def _open(path: Path) -> Image.Image:
         pillow_heif.register_heif_opener()
     try:
         image = Image.open(path)
-        if image.width * image.height > MAX_PIXELS:
-            raise InputError(f"{path}: has more than {MAX_PIXELS // 10**6} megapixels; scale it down")
         image.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError:
+        raise InputError(f"{path}: has more than {MAX_PIXELS // 10**6} megapixels; scale it down") from None
+    except (OSError, ValueError, SyntaxError) as error:
         raise InputError(f"{path}: is no photo that can be read ({error}); repair or remove it") from None
     return image
 

@@ -69,9 +69,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.data:
         raise InputError("give at least one DATA folder, or --list")
 
-    from splitnerf.data.frames import refuse_data
+    from splitnerf.data.frames import read_frames, refuse_data
     from splitnerf.evaluate.scoring import Protocol
-    from splitnerf.files import atomic_path, locked
+    from splitnerf.files import atomic_path, locked, refuse_others
 
     from splitnerf_tools.ablate.runs import AblationPlan, Interrupted, ablate
     from splitnerf_tools.ablate.scores import csv_table, markdown_table
@@ -80,14 +80,19 @@ def run(args: argparse.Namespace) -> int:
     if len(scenes) < len(args.data):
         raise InputError("two DATA folders have the same name; ablate them into different --out")
 
+    tables = args.out / "ablation.csv", args.out / "ablation.md"
+
     def show(scores: list) -> None:
-        for name, text in (("ablation.csv", csv_table(scores)), ("ablation.md", markdown_table(scores))):
-            with atomic_path(args.out / name) as temporary:
+        for path, text in zip(tables, (csv_table(scores), markdown_table(scores))):
+            with atomic_path(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
     protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps)
     plan = AblationPlan(list(scenes.values()), rows, args.seeds, protocol, args.out)
     refuse_data(args.out)
+    refuse_others(tables[0], b"scene,row,seed,", tables[1])
+    for scene in plan.scenes:  # before the first is trained on
+        read_frames(scene, "train", rows[0].config.reading)
     try:
         with locked(args.out):
             scores = ablate(plan, show)
@@ -95,5 +100,5 @@ def run(args: argparse.Namespace) -> int:
         print(f"stopped; the state is in {args.out}. To continue, repeat the command.")
         return INTERRUPTED
     print(markdown_table(scores))
-    print(f"results: {args.out / 'ablation.md'}, {args.out / 'ablation.csv'}")
+    print(f"results: {tables[1]}, {tables[0]}")
     return DONE

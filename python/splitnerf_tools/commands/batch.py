@@ -61,17 +61,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from splitnerf.data.frames import refuse_data
-    from splitnerf.files import locked
+    from splitnerf.files import locked, refuse_foreign, refuse_others
 
     from splitnerf_tools.batch.cluster import machines_of, ray_on, share_of
     from splitnerf_tools.batch.scenes import DONE as SCENE_DONE
-    from splitnerf_tools.batch.scenes import LOGS, TABLE, UNITS, known_scenes, requested_scenes, terminal_row
+    from splitnerf_tools.batch.scenes import LOGS, STATE, TABLE, UNITS, known_scenes, requested_scenes, terminal_row
     from splitnerf_tools.batch.tasks import BatchPlan, run_batch
 
     check_usage(args)
     refuse_data(args.out)
     with locked(args.out):
         known = known_scenes(args.out)
+        refuse_others(args.out / STATE, b'"scenes"', args.out / TABLE)
+        refuse_foreign(args.out / LOGS)
         requested = requested_scenes(known, args.scenes)
         out, err = sys.stdout, sys.stderr  # Ray's output goes elsewhere, see ray_on
 

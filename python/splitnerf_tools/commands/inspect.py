@@ -34,16 +34,16 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from splitnerf.files import refuse_others
     from splitnerf.pipeline import load_splits
 
     from splitnerf_tools.inspection.checks import inspect
-    from splitnerf_tools.inspection.inspect_page import holds_page, write_page
+    from splitnerf_tools.inspection.inspect_page import write_page
 
     page = args.out / PAGE if args.out.is_dir() else args.out
     if page.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{page}: is not a page; give --out a name that ends in .html, or a folder")
-    if page.is_file() and not holds_page(page):
-        raise InputError(f"{page}: is no earlier page of this command, and would be replaced; give another --out")
+    refuse_others(page, b"inspected data</title>")
     reading = reading_of(args, args.data)
     found = inspect(*load_splits(args.data, args.downscale, reading), reading)
     for finding in found.findings:

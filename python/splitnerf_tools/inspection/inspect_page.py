@@ -48,12 +48,6 @@ def write_page(path: Path, found: Inspection) -> None:
     )
 
 
-def holds_page(path: Path) -> bool:
-    """Whether a file is such a page."""
-    with open(path, "rb") as file:
-        return b"inspected data</title>" in file.read(4096)
-
-
 def _plans(found: Inspection, kinds: list[str]) -> list[Markup]:
     """The cameras and the hull from above and from the side."""
     x, y = horizontal_axes(found.upward)

@@ -137,7 +137,7 @@ def with_smaller_textures(document: Document, side: int) -> bytes:
     images = {image["bufferView"]: image for image in tree.get("images", []) if "bufferView" in image}
     binary = bytearray()
     for number, view in enumerate(tree.get("bufferViews", [])):
-        content = document.view(number)
+        content = bytes(document.view(number))
         if number in images and (smaller := smaller_image(content, side)):
             content, images[number]["mimeType"] = smaller, "image/png"
         view |= {"buffer": 0, "byteOffset": len(binary), "byteLength": len(content)}

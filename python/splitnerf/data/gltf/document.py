@@ -98,7 +98,7 @@ class Document:
         """The encoded bytes of an image, and its name for messages."""
         image = self.json["images"][index]
         name = f"{self.path}: image {index}" + (f" '{image['name']}'" if "name" in image else "")
-        return (self.view(image["bufferView"]) if "bufferView" in image else self._resource(image["uri"])), name
+        return (bytes(self.view(image["bufferView"])) if "bufferView" in image else self._resource(image["uri"])), name
 
     def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON chunk and the binary one, or None."""
@@ -130,13 +130,13 @@ class Document:
             raise InputError(f"{self.path}: damaged, an accessor reaches beyond its buffer view; export it again")
         return np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
 
-    def view(self, index: int) -> bytes:
-        """The bytes of a buffer view."""
+    def view(self, index: int) -> memoryview:
+        """The bytes of a buffer view, which are not copied: many accessors may share a large one."""
         view = self.json["bufferViews"][index]
         data, start = self._buffer(view["buffer"]), view.get("byteOffset", 0)
         if start + view["byteLength"] > len(data):
             raise InputError(f"{self.path}: damaged, a buffer view reaches beyond its buffer; export it again")
-        return data[start : start + view["byteLength"]]
+        return memoryview(data)[start : start + view["byteLength"]]
 
     def _buffer(self, index: int) -> bytes:
         if index not in self._buffers:

@@ -46,8 +46,8 @@ def _read(document: Document) -> Asset:
     if document.get("animations"):
         note(f"{path}: has animations; drawn as it stands")
     parts = scene_parts(document)
-    indices = list(dict.fromkeys(part.material for part in parts))
-    materials = {index: _read_material(document, index) for index in indices}
+    materials = {index: _read_material(document, index) for index in dict.fromkeys(part.material for part in parts)}
+    ids = {index: i for i, index in enumerate(materials)}
     uvs = [_uv(path, part, *materials[part.material]) for part in parts]
     with_normal_map = any(material.normal_texture is not None for material, _ in materials.values())
     for i, (part, uv) in enumerate(zip(parts, uvs)):
@@ -67,8 +67,8 @@ def _read(document: Document) -> Asset:
         vertices=_z_up(np.concatenate([part.vertices for part in parts])),
         triangles=np.concatenate([p.triangles + start for p, start in zip(parts, starts)]).astype(np.int32),
         normals=_z_up(np.concatenate([part.normals for part in parts])),
-        material_ids=np.repeat([indices.index(part.material) for part in parts], counts).astype(np.int32),
-        materials=[materials[index][0] for index in indices],
+        material_ids=np.repeat([ids[part.material] for part in parts], counts).astype(np.int32),
+        materials=[material for material, _ in materials.values()],
         uv=None if uv is None else uv.astype(np.float32),
         tangents=_z_up(np.concatenate([_tangents(p, c) for p, c in zip(parts, uvs)])) if with_normal_map else None,
         colors=None if colors is None else colors.astype(np.float32),
