@@ -278,8 +278,9 @@ def write_ablation(out: Path, work: Path) -> bool:
         "",
         header(facts),
         "",
-        f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included. One run a row, so less",
-        "than 0.3 dB is no difference. [Ablation](../ablation.md) says what the rows mean.",
+        f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included.",
+        "One run a row, so less than 0.3 dB is no difference; minutes are as the machine had time. [Ablation](../ablation.md) says what",
+        "the rows mean.",
         "",
         (folder / "ablation.md").read_text(),
     ]
