@@ -23,7 +23,8 @@ from splitnerf_tools.capture.photographs import Photograph
 
 LONGEST = 2000  # edge in pixels of the photos in which features are looked for: 16 megapixels take 7 s each
 MOST_FEATURES = 4096  # of a photo: more take longer in all that follows
-BLOCK = 32  # pairs of photos whose matches are written at once, so that the progress moves
+TILE = 8  # photos along the edge of a tile of pairs
+BLOCK = 64  # pairs of photos whose matches are written at once, so that the progress moves
 EXHAUSTIVE = 250  # photos up to which each is matched with each other one
 OVERLAP = 15  # neighbours in the order of names with which a photo is matched beyond that, and those 2^k further
 COUNT = """
@@ -184,8 +185,8 @@ def file_name(name: str) -> str:
 
 def photo_pairs(n: int) -> list[tuple[int, int]]:
     """The pairs of n photos that are matched, each once: all; of more than EXHAUSTIVE those near in the order of names."""
-    if n <= EXHAUSTIVE:
-        return list(combinations(range(n), 2))
+    if n <= EXHAUSTIVE:  # tile by tile, so that the features of a tile's photos stay in memory
+        return sorted(combinations(range(n), 2), key=lambda pair: (pair[0] // TILE, pair[1] // TILE))
     steps = [*range(1, OVERLAP + 1), *(2**k for k in range(n.bit_length()) if 2**k > OVERLAP)]
     return [(i, i + step) for i in range(n) for step in steps if i + step < n]
 
