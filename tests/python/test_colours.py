@@ -1,0 +1,183 @@
+"""The colours that photos' files state, and that each is brought to sRGB."""
+
+import io
+import struct
+import zlib
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from PIL import Image, ImageCms
+from splitnerf import errors
+from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, srgb_to_linear
+from splitnerf.relight.background import read_plate
+from splitnerf_tools.capture.photographs import find_photographs, read_upright
+
+
+@pytest.fixture(autouse=True)
+def unsaid(monkeypatch):
+    """No note was written yet."""
+    monkeypatch.setattr(errors, "_said", set())
+
+
+def png(pixels: np.ndarray) -> Image.Image:
+    return Image.fromarray(pixels)
+
+
+def wide_profile(name: str = "wide") -> bytes:
+    """An ICC profile with sRGB's curve, whose red is that of Display P3 (tag values: CSS Color 4, adapted to D50)."""
+    srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    columns = {b"rXYZ": (0.5151, 0.2412, -0.0011), b"gXYZ": (0.2920, 0.6922, 0.0419), b"bXYZ": (0.1571, 0.0666, 0.7841)}
+    for i in range(struct.unpack(">I", srgb[128:132])[0]):
+        tag, offset, size = struct.unpack(">4sII", srgb[132 + 12 * i : 144 + 12 * i])
+        if tag in columns:
+            srgb[offset + 8 : offset + 20] = struct.pack(">3i", *(round(65536 * x) for x in columns[tag]))
+        if tag == b"desc":
+            srgb[offset : offset + size] = srgb[offset : offset + size].replace(
+                "sRGB".encode("utf-16-be"), name.encode("utf-16-be")
+            )
+    return bytes(srgb)
+
+
+# From linear Display P3 to linear sRGB (CSS Color 4, section 10).
+FROM_P3 = np.array(
+    [[1.2249401762, -0.2249401762, 0], [-0.0420569547, 1.0420569547, 0], [-0.0196375546, -0.0786360456, 1.0982736]]
+)
+
+
+@pytest.mark.parametrize(("suffix", "name"), [(".png", "wide"), (".jpg", "wide"), (".png", "sRGB")])
+def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix, name):
+    photo = np.full((16, 16, 3), (180, 130, 90), np.uint8)
+    Image.fromarray(photo).save(tmp_path / f"x{suffix}", icc_profile=wide_profile(name), quality=100, subsampling=0)
+    expected = 255 * linear_to_srgb((FROM_P3 @ srgb_to_linear(np.float32([180, 130, 90]) / 255)).astype(np.float32))
+    assert read_colours(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(expected, abs=2) and abs(expected[0] - 180) > 8
+    assert "are converted to sRGB" in capsys.readouterr().err
+    assert read_codes(tmp_path / f"x{suffix}")[3, 3] == pytest.approx([180, 130, 90], abs=2)  # a map of numbers
+    (photo_of,) = find_photographs(tmp_path)
+    assert read_upright(photo_of.path)[3, 3] == pytest.approx(expected, abs=2)
+    assert read_plate(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(
+        srgb_to_linear(np.float32(expected) / 255), rel=0.06
+    )
+
+
+def test_a_profile_beside_damaged_exif_is_applied(tmp_path, monkeypatch):
+    monkeypatch.setattr(Image.Exif, "get_ifd", {}.__getitem__)  # raises KeyError
+    Image.fromarray(np.full((4, 4, 3), (180, 130, 90), np.uint8)).save(tmp_path / "x.png", icc_profile=wide_profile())
+    assert read_colours(tmp_path / "x.png")[2, 2, 0] > 185
+
+
+def grey_profile() -> bytes:
+    """An ICC profile of one channel whose curve is a gamma of 1.8."""
+    curve = struct.pack(">4s4xIH2x", b"curv", 1, round(1.8 * 256))
+    white = struct.pack(">4s4x3i", b"XYZ ", *(round(65536 * x) for x in (0.9642, 1.0, 0.8249)))
+    texts = [
+        struct.pack(">4s4xI", b"desc", 5) + b"grey\0" + bytes(78 + 1),
+        struct.pack(">4s4x", b"text") + b"none\0" + bytes(3),
+    ]
+    body, table = b"", b""
+    for tag, data in zip((b"kTRC", b"wtpt", b"desc", b"cprt"), (curve, white, *texts)):
+        table += struct.pack(">4sII", tag, 132 + 12 * 4 + len(body), len(data))
+        body += data
+    size = 132 + len(table) + len(body)
+    head = struct.pack(">I4xI4s4s4s12x4s", size, 0x02200000, b"mntr", b"GRAY", b"XYZ ", b"acsp")
+    illuminant = struct.pack(">3i", *(round(65536 * x) for x in (0.9642, 1.0, 0.8249)))
+    return head.ljust(68, b"\0") + illuminant + bytes(48) + struct.pack(">I", 4) + table + body
+
+
+def write_words(path, pixels: np.ndarray, profile: bytes) -> None:
+    """A PNG of 16 bits with an ICC profile."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "uint16")
+    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(profile)}]"), np.frombuffer(profile, np.uint8))
+    sink = oiio.ImageOutput.create("x.png")
+    assert sink.open(str(path), spec) and sink.write_image(pixels) and sink.close()
+
+
+def test_a_profile_that_is_srgb_changes_nothing(tmp_path, capsys):
+    photo = np.full((4, 4, 3), (180, 130, 90), np.uint8)
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    Image.fromarray(photo).save(tmp_path / "srgb.png", icc_profile=srgb)
+    write_words(tmp_path / "words.png", np.uint16(photo) * 257 + np.uint16(3), srgb)
+    assert np.array_equal(read_colours(tmp_path / "srgb.png"), photo)
+    assert np.array_equal(read_colours(tmp_path / "words.png"), np.uint16(photo) * 257 + 3)
+    assert capsys.readouterr().err == ""
+
+
+def test_profiles_of_words_and_of_grey_photos_are_applied(tmp_path):
+    p3 = linear_to_srgb((FROM_P3 @ srgb_to_linear(np.float32([180, 130, 90]) / 255)).astype(np.float32))
+    write_words(tmp_path / "words.png", np.full((4, 4, 3), (180, 130, 90), np.uint16) * np.uint16(257), wide_profile())
+    assert read_colours(tmp_path / "words.png")[2, 2] == pytest.approx(65535 * p3, abs=400)
+    grey = 255 * linear_to_srgb(np.float32([(90 / 255) ** 1.8]))[0]
+    assert abs(grey - 90) > 8
+    photo = np.full((4, 4, 1), 90, np.uint8)
+    Image.fromarray(photo[..., 0]).save(tmp_path / "grey.png", icc_profile=grey_profile())
+    write_words(tmp_path / "grey_words.png", np.uint16(photo) * 257, grey_profile())
+    assert read_colours(tmp_path / "grey.png")[2, 2] == pytest.approx([grey], abs=1.5)
+    assert read_colours(tmp_path / "grey_words.png")[2, 2] == pytest.approx([257 * grey], abs=400)
+    for name, factor in (("grey", 1), ("grey_words", 257)):  # as `prepare` reads it
+        assert read_upright(tmp_path / f"{name}.png")[2, 2] == pytest.approx([factor * grey] * 3, abs=1.5 * factor)
+
+
+def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
+    """A PNG file with another chunk before its pixels."""
+    buffer = io.BytesIO()
+    image.save(buffer, "png")
+    whole = buffer.getvalue()
+    chunk = struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return whole[:33] + chunk + whole[33:]
+
+
+@pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
+def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
+    (tmp_path / "x.png").write_bytes(
+        with_chunk(png(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
+    )
+    expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
+    assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
+    assert ("state the gamma" in capsys.readouterr().err) == (exponent is not None)
+    assert read_upright(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)  # as `prepare` reads it
+
+
+# From linear Adobe RGB to linear sRGB (Adobe RGB (1998) Color Image Encoding, section 4.3; IEC 61966-2-1).
+FROM_ADOBE = np.array([[1.3983, -0.3983, 0], [0, 1, 0], [0, -0.0429, 1.0429]])
+
+
+@pytest.mark.parametrize("stated", ["EXIF", "cHRM", "cICP"])
+def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, stated):
+    """Adobe RGB as cameras state it and as a PNG's chunks do; Display P3 by its code."""
+    colour, image = np.float32([180, 100, 60]), png(np.full((4, 4, 3), (180, 100, 60), np.uint8))
+    path = tmp_path / ("x.jpg" if stated == "EXIF" else "x.png")
+    if stated == "EXIF":
+        exif = Image.Exif()
+        exif.get_ifd(34665)[40961] = 65535
+        exif.get_ifd(34665)[40965] = {1: "R03"}
+        image.save(path, exif=exif, quality=100, subsampling=0)
+    elif stated == "cHRM":
+        chunk = struct.pack(">8I", 31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000)
+        path.write_bytes(with_chunk(image, b"cHRM", chunk))
+    else:
+        path.write_bytes(with_chunk(image, b"cICP", bytes((12, 13, 0, 1))))
+    light = (colour / 255) ** 2.2 if stated == "EXIF" else srgb_to_linear(colour / 255)
+    light = (FROM_P3 if stated == "cICP" else FROM_ADOBE) @ light
+    expected = 255 * linear_to_srgb(light.astype(np.float32))
+    assert abs(expected - colour).max() > 8
+    for read in (read_colours, read_upright):
+        assert read(path)[2, 2] == pytest.approx(expected, abs=2)
+    assert "primaries that are not sRGB's; they are brought to sRGB" in capsys.readouterr().err
+
+
+def test_an_unknown_colour_space_and_an_alpha_are_said(tmp_path, capsys):
+    """As cameras say that they are set to another space without a name; a curve for bright screens; of cut-outs."""
+    exif = Image.Exif()
+    exif.get_ifd(34665)[40961] = 65535
+    png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
+    (tmp_path / "x.png").write_bytes(with_chunk(png(np.zeros((4, 4, 3), np.uint8)), b"cICP", bytes((9, 16, 0, 1))))
+    for file, read in (("x.jpg", read_colours), ("x.jpg", read_upright), ("x.png", read_colours)):
+        errors._said.clear()
+        read(tmp_path / file)
+        assert "state that their colours are not sRGB, and not what they are" in capsys.readouterr().err
+    no_light = struct.pack(">8I", 31270, 32900, 64000, 0, 64000, 0, 15000, 6000)
+    (tmp_path / "z.png").write_bytes(with_chunk(png(np.full((4, 4, 3), 9, np.uint8)), b"cHRM", no_light))
+    assert (read_colours(tmp_path / "z.png") == 9).all() and "primaries that are none" in capsys.readouterr().err
+    png(np.zeros((4, 4, 4), np.uint8)).save(tmp_path / "y.png")
+    read_upright(tmp_path / "y.png")
+    assert "the alpha of photos is not used; give --masks if it is the object's (y.png)" in capsys.readouterr().err
