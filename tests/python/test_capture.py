@@ -1,18 +1,16 @@
 """From photographs to data: each part against closed forms, and the whole on a painted ball."""
 
 import fcntl
-import io
 import json
 import sqlite3
 import subprocess
 import sys
 import threading
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import astuple, replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
-import cv2
 import numpy as np
 import pycolmap
 import pytest
@@ -31,22 +29,14 @@ from splitnerf.training.losses import SeenLight
 from splitnerf_tools.capture import poses
 from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
-from splitnerf_tools.capture.photographs import (
-    Photograph,
-    find_photographs,
-    read_upright,
-    sharpness,
-    write_frames,
-    write_png,
-)
+from splitnerf_tools.capture.photographs import Photograph, find_photographs
 from splitnerf_tools.capture.photometry import find_exposures
-from splitnerf_tools.capture.poses import Lens, Reconstruction, _counted, _is_sound
+from splitnerf_tools.capture.poses import LEAST_SEEN, Lens, Reconstruction, _adjusted, _counted, _is_sound, _taken_out
 from splitnerf_tools.capture.prepare import PrepareSettings, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
 from splitnerf_tools.capture.world import CAMERA_DISTANCE, World, settle
 from table_scene import BALL, CAMERA, RADIUS, TABLE_RADIUS, photograph, ring, surface_colours, write_photos
-from test_files import no_more_than
 from tiny_runs import refused
 
 PLAIN = Lens(320, 240, 320.0, 320.0, 160.0, 120.0, 0.0, 0.0, 0.0, 0.0)
@@ -238,6 +228,20 @@ def test_photos_without_detail_are_told_of(tmp_path, capsys):
     assert "photos: the photos show too little detail; put the object on a pattern" in error
 
 
+def test_a_camera_that_nearly_no_points_hold_is_none():
+    """The others keep theirs, with the lens in OpenCV's model."""
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = 1, 1, 8
+    options.camera_model_id, options.camera_params = pycolmap.CameraModelId.RADIAL, [900, 512, 384, 0.05, 0.01]
+    model = pycolmap.synthesize_dataset(options)
+    weak = model.images[model.reg_image_ids()[3]]
+    for index in weak.get_observation_point2D_idxs()[LEAST_SEEN - 1 :]:
+        model.delete_observation(weak.image_id, int(index))
+    found = _taken_out(_adjusted(model), 1)
+    assert len(found.names) == 7 and weak.name not in found.names and found.photo_of.max() == 6
+    assert np.allclose([astuple(lens) for lens in found.lenses], [1024, 768, 900, 900, 512, 384, 0.05, 0.01, 0, 0])
+
+
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])
 def test_a_damaged_database_of_features_is_known(tmp_path, damage):
     path = tmp_path / "features.db"
@@ -281,49 +285,6 @@ def test_a_folder_is_prepared_by_one_program(tmp_path, capsys):
     assert len(list(deep.parent.iterdir())) == 3 and not deep.exists()
 
 
-def test_a_frame_without_room_is_an_error(tmp_path):
-    """And an image or mask, which one function writes."""
-    (tmp_path / "a.png").write_text("old")
-    with no_more_than(700), pytest.raises(OSError, match="a.png: cannot be written .File too large."):
-        write_png(tmp_path / "a.png", np.random.default_rng(0).integers(0, 255, (90, 90, 3), np.uint8))
-    assert (tmp_path / "a.png").read_text() == "old" and len(list(tmp_path.iterdir())) == 1
-
-
-def test_files_tell_of_turns_and_exposures(tmp_path):
-    pixels = np.zeros((20, 30, 3), np.uint8)
-    pixels[:, :15] = 200
-    exif = Image.Exif()
-    exif[0x0112] = 6  # the camera was turned: rows run to the left
-    exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 2.0, 0x8827: 100, 0xA405: 26})
-    Image.fromarray(pixels).save(tmp_path / "a.jpg", exif=exif, quality=95)
-    (tmp_path / "b.jpg").write_bytes((tmp_path / "a.jpg").read_bytes())
-    Image.fromarray(pixels).save(tmp_path / "a.png")
-    first, second = find_photographs(tmp_path)
-    assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
-    assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
-    assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
-    assert first.exposure == pytest.approx(0.25)
-    assert first.focal == pytest.approx(26 / np.hypot(36, 24) * np.hypot(20, 30))
-    assert (second.exposure, second.focal) == (None, None)
-
-
-def test_damaged_exif_costs_no_photo(tmp_path):
-    """Whatever one, two or five of its bytes say."""
-    exif, data, random = Image.Exif(), io.BytesIO(), np.random.default_rng(0)
-    exif[0x0112], exif[0x010F] = 6, "Maker"
-    exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 2.0, 0x8827: 100, 0xA405: 26})
-    Image.fromarray(random.integers(0, 255, (8, 12, 3), np.uint8)).save(data, "jpeg", exif=exif)
-    good, path = data.getvalue(), tmp_path / "a.jpg"
-    first, length = good.index(b"Exif") + 6, len(exif.tobytes()) - 6
-    for _ in range(400):
-        changed = bytearray(good)
-        for at in random.integers(first, first + length, random.choice((1, 2, 5))):
-            changed[at] = random.choice((0, 255, random.integers(256)))
-        path.write_bytes(changed)
-        (photo,) = find_photographs(tmp_path)
-        assert read_upright(path).shape == (photo.height, photo.width, 3)
-
-
 def test_two_photos_are_too_few(tmp_path, capsys):
     (tmp_path / "photos").mkdir()
     for i, pixels in enumerate(np.random.default_rng(0).integers(0, 255, (2, 40, 60, 3), np.uint8)):
@@ -331,32 +292,6 @@ def test_two_photos_are_too_few(tmp_path, capsys):
     assert main(["prepare", str(tmp_path / "photos"), "--out", str(tmp_path / "out")]) == BAD_INPUT
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.endswith("holds 2 different photos, fewer than 3; take 30 or more")
-
-
-@pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])
-def test_bad_photos_are_named(tmp_path, content, told):
-    if content is not None:
-        (tmp_path / "a.jpg").write_bytes(content)
-    with pytest.raises(InputError, match=told):
-        find_photographs(tmp_path)
-
-
-def test_a_false_raw_photo_is_named(tmp_path, monkeypatch):
-    """Whether rawpy is there or not."""
-    error = type("LibRawError", (Exception,), {})
-    (tmp_path / "a.dng").write_bytes(b"no raw photo")
-    rawpy = SimpleNamespace(LibRawError=error, imread=Mock(side_effect=error(b"Unsupported")))
-    for module, told in ((rawpy, "a.dng: is no raw photo that can be read"), (None, "a.dng: raw photos need")):
-        monkeypatch.setitem(sys.modules, "rawpy", module)
-        with pytest.raises(InputError, match=told):
-            find_photographs(tmp_path)
-
-
-@pytest.mark.parametrize("size", [(1, 3000), (3000, 1), (1, 1)])
-def test_a_photo_may_be_a_line(tmp_path, size):
-    Image.new("RGB", size, "red").save(tmp_path / "a.png")
-    (photo,) = find_photographs(tmp_path)
-    assert (photo.width, photo.height) == size and sharpness(read_upright(photo.path)) < 1e-6
 
 
 def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
@@ -367,32 +302,6 @@ def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
     monkeypatch.setattr(preparation, "settle", lambda found, seed: seeds.append(seed) or 1 / 0)
     main(["prepare", str(tmp_path), "--out", str(tmp_path / "out"), "--seed", "7"])
     assert seeds == [7, 7]
-
-
-@pytest.mark.parametrize(("name", "told"), [("v.mp4", "is no video"), ("photos", "holds 1 different photos")])
-def test_libraries_say_nothing_beside_the_program(tmp_path, name, told):
-    """Of a video that is none, and of EXIF data that are cut short."""
-    (tmp_path / "v.mp4").write_text("no video")
-    (tmp_path / "photos").mkdir()
-    exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x05\x01\x12\0\x03\0\0\0\x10\xff\xff\xff\0"
-    Image.new("RGB", (40, 30)).save(tmp_path / "photos/a.jpg", exif=exif)
-    command = [sys.executable, "-m", "splitnerf", "prepare", name, "--out", "out"]
-    said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stderr
-    assert told in said and all(line.startswith("splitnerf: ") for line in said.splitlines()), said
-
-
-def test_the_sharpest_frames_of_a_video(tmp_path):
-    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (320, 240))
-    sharp = photograph(ring(3)[0], 320.0, 320, 240)[0]
-    blurred = cv2.GaussianBlur(sharp, (15, 15), 4)
-    for number in range(12):
-        writer.write(sharp if number in (2, 5, 9) else blurred)
-    writer.release()
-    (tmp_path / "frames").mkdir()
-    write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, lambda share: None)
-    frames = sorted((tmp_path / "frames").iterdir())
-    assert len(frames) == 3
-    assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
 def as_whole(image: np.ndarray, i: int) -> np.ndarray:

@@ -40,6 +40,7 @@ FEW = 10  # photos up to which points that two of them show are kept
 ITERATIONS = 20  # of each adjustment: 15 and 30 give the same cameras; 100 took minutes
 # Pixels of reprojection and photos of a point beyond and below which the adjustment drops it.
 MAX_ERROR, SHORTEST = 2.0, 3
+LEAST_SEEN = 15  # points that a photo shows, with fewer of which its camera is not believed
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
@@ -131,14 +132,14 @@ def reconstruct(
     Raises:
         InputError: Fewer than three photos fit together.
     """
-    database = folder / "features.db"
+    database = folder / "colmap.db"
     if database.exists() and not _is_sound(database):
         note(f"{database}: is damaged; the photos' features are searched for again")
         database.unlink()
     extraction, pipeline = pycolmap.FeatureExtractionOptions(), pycolmap.IncrementalPipelineOptions()
     extraction.max_image_size, extraction.sift.max_num_features = LONGEST, MOST_FEATURES
     reader = pycolmap.ImageReaderOptions()
-    reader.camera_model = "OPENCV"
+    reader.camera_model = "RADIAL"  # with OPENCV's two focal lengths, half of the mappings of few photos end elsewhere
     if moving is not None:
         reader.mask_path = moving
     pipeline.random_seed = pipeline.mapper.random_seed = seed
@@ -164,6 +165,7 @@ def reconstruct(
             database, images, folder, pipeline, next_image_callback=lambda: report("cameras", next(placed, n) / n)
         )
         model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
+        model = model and _adjusted(model)
         if model is None or model.num_reg_images() < MIN_PHOTOS:
             if _count_keypoints(database) < LEAST_DETAIL * n:
                 raise InputError(
@@ -174,7 +176,6 @@ def reconstruct(
                 f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
                 f"the next, of an object that does not move on a table with a pattern{otherwise}"
             )
-        model = _adjusted(model)
     return _taken_out(model, len(models))
 
 
@@ -192,7 +193,8 @@ def photo_pairs(n: int) -> list[tuple[int, int]]:
 
 
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
-    """The model with everything refined at once, the principal points too, which the mapping holds at the photos' centres.
+    """The model with everything refined at once: the principal points too, which the mapping holds at the photos' centres, and
+    all of OPENCV's lens. Photos that show too few of the points lose their cameras.
 
     Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
     them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
@@ -200,6 +202,9 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     shortest = SHORTEST if model.num_reg_images() > FEW else 2
     for principal_points in (True, False):
         refined = pycolmap.Reconstruction(model)
+        for camera in refined.cameras.values():
+            f, *rest = camera.params
+            camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [f, f, *rest, 0.0, 0.0]
         options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
         options.refine_principal_point, options.print_summary = principal_points, False
         options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
@@ -216,6 +221,8 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
                 refined.delete_point3D(key)
         if all(_is_central(camera) for camera in refined.cameras.values()):
             break
+    for key in [key for key in refined.reg_image_ids() if refined.images[key].num_points3D < LEAST_SEEN]:
+        refined.deregister_frame(refined.images[key].frame_id)
     return refined
 
 
