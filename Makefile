@@ -1,11 +1,11 @@
 # make demo   installs what is missing, builds, and reconstructs an embedded scene
-# make test   installs, builds, checks form and budgets, and runs gtest and pytest
+# make test   installs, builds, checks form, budgets and the age of tables, and runs gtest and pytest
 # make lint   checks the form of all sources; make format brings them into it
 # make budget   prints how large each part is beside its budget, and fails where one is exceeded
 # make sanitize   builds gtest with AddressSanitizer and UndefinedBehaviorSanitizer, and the GPU's kernels with ThreadSanitizer
 # make faults   plants faults in the GPU's kernels and says what finds each
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
-# make tables   says which tables under docs/ are stale
+# make tables   says which tables under docs/ are stale, and fails where one is too old
 # make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
 # make docs   builds the documentation into build/docs (HTML, to be read without a network)
 # make figures   draws the figures of docs/method.md with the operators
@@ -36,7 +36,7 @@ READERS := json colmap neus png exr hdr glb checkpoint
 demo: install
 	$(BIN)/splitnerf demo
 
-test: install lint budget gtest pytest
+test: install lint budget tables gtest pytest
 
 CPP := $(shell find cpp tests -name '*.cpp' -o -name '*.h' -o -name '*.cu' -o -name '*.cuh')
 lint: install

@@ -71,27 +71,33 @@ class TestTables:
     def measured(self, root):
         facts = provenance.provenance(("cpp/*hash*", "python"), root=root)
         (root / "docs" / "benchmarks" / "grid.md").write_text(f"# Grid\n\n{provenance.header(facts)}\n")
-        return tables.states(root)[Path("docs/benchmarks/grid.md")]
+        return self.said(root)
 
-    def test_a_change_of_what_is_measured_makes_a_table_stale(self, checkout):
+    def said(self, root, page="grid"):
+        return tables.states(root)[Path(f"docs/benchmarks/{page}.md")][0]
+
+    def test_a_change_of_what_is_measured_makes_a_table_stale(self, checkout, monkeypatch):
+        monkeypatch.setattr(tables, "MOST_BEHIND", 1)
         assert self.measured(checkout) == "fresh"
         self.change(checkout, "cpp/other.h", "1")
-        assert tables.states(checkout) == {Path("docs/benchmarks/grid.md"): "fresh"}
+        assert tables.states(checkout) == {Path("docs/benchmarks/grid.md"): ("fresh", 0)}
         self.change(checkout, "cpp/hash_grid.h", "2")
-        assert "stale: 1 commits since" in tables.states(checkout)[Path("docs/benchmarks/grid.md")]
+        assert "stale: 1 commits since" in self.said(checkout) and tables.main(checkout) == 0
+        self.change(checkout, "cpp/hash_grid.h", "3")
+        assert "stale: 2 commits since" in self.said(checkout) and tables.main(checkout) == 1
 
     def test_what_was_measured_with_changes_is_stale(self, checkout):
         (checkout / "docs" / "prose.md").write_text("x")
         assert self.measured(checkout) == "fresh"
         (checkout / "cpp" / "hash_grid.h").write_text("3")
-        assert "stale: made beside changes" in self.measured(checkout)
+        assert "stale: made beside changes" in self.measured(checkout) and tables.main(checkout) == 1
 
     def test_what_says_nothing_of_itself_is_unknown(self, checkout):
         page = checkout / "docs" / "benchmarks" / "old.md"
         page.write_text("commit 1234567.")
-        assert tables.states(checkout) == {Path("docs/benchmarks/old.md"): "unknown: no head with commit and sources"}
+        assert self.said(checkout, "old") == "unknown: no head with commit and sources" and tables.main(checkout) == 1
         page.write_text("commit 1234567; measures `cpp`.")
-        assert "unknown: no commit 1234567" in tables.states(checkout)[Path("docs/benchmarks/old.md")]
+        assert "unknown: no commit 1234567" in self.said(checkout, "old") and tables.main(checkout) == 0
 
 
 def test_commands_hold_no_path_of_the_machine(monkeypatch):
