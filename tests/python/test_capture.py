@@ -11,6 +11,7 @@ from dataclasses import astuple, replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import cv2
 import numpy as np
 import pycolmap
 import pytest
@@ -314,15 +315,23 @@ def as_held(image: np.ndarray, i: int) -> np.ndarray:
     return (image, np.rot90(image), image[:, side : image.shape[1] - side])[i % 3]
 
 
+def as_zoomed(image: np.ndarray, i: int) -> np.ndarray:
+    """Each other picture from nearer, in the same size."""
+    h, w = image.shape[:2]
+    near = image[h // 7 : h - h // 7, w // 7 : w - w // 7].astype(np.uint8)
+    return cv2.resize(near, (w, h), interpolation=cv2.INTER_CUBIC).astype(image.dtype) if i % 2 else image
+
+
 @pytest.mark.parametrize(
     ("given", "turntable", "held"),
     [
         (True, False, as_whole),
         (True, True, as_whole),
         (True, False, as_held),
+        (True, False, as_zoomed),
         pytest.param(False, False, as_whole, marks=pytest.mark.slow),
     ],
-    ids=["around", "turntable", "three sizes", "masks to find"],
+    ids=["around", "turntable", "three sizes", "zoomed", "masks to find"],
 )
 def test_photos_to_data(tmp_path, capsys, monkeypatch, given, turntable, held):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""
@@ -331,7 +340,7 @@ def test_photos_to_data(tmp_path, capsys, monkeypatch, given, turntable, held):
     (tmp_path / "masks").mkdir()
     balls = [held(photograph(pose, *CAMERA)[1], i) for i, pose in enumerate(truth)]
     for i, (path, ball) in enumerate(zip(sorted((tmp_path / "photos").iterdir()), balls)):
-        name = path.name if held is as_whole else f"1 %20 {path.name}"
+        name = f"1 %20 {path.name}" if held is as_held else path.name
         Image.fromarray(255 * ball.astype(np.uint8)).save(tmp_path / "masks" / name)
         Image.fromarray(held(np.asarray(Image.open(path)), i)).save(path)
         path.rename(path.with_name(name))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sqlite3
 import subprocess
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -43,6 +45,12 @@ MAX_ERROR, SHORTEST = 2.0, 3
 LEAST_SEEN = 15  # points that a photo shows, with fewer of which its camera is not believed
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
+FOCAL_RANGE = 0.3, 6.0  # focal lengths that are believed, in lengths of the photo's longer edge
+ONE_LENS = 0.03  # most difference of two focal lengths of one lens, as a share
+OF_A_LENS = 20  # observations by which a further lens must be worth it
+# Pixels of reprojection and share of the photos without a camera from which on all cameras are doubted.
+SURE, FEW_LOST = 0.4, 0.05
+TRIES = 2  # to find better ones
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
 
 
@@ -143,6 +151,8 @@ def reconstruct(
     if moving is not None:
         reader.mask_path = moving
     pipeline.random_seed = pipeline.mapper.random_seed = seed
+    for part in (pipeline, pipeline.mapper, pipeline.triangulation):
+        part.min_focal_length_ratio, part.max_focal_length_ratio = FOCAL_RANGE
     n = len(photos)
     with _quiet():
         with _counted(database, "keypoints", n, lambda share: report("features", share)):
@@ -160,12 +170,8 @@ def reconstruct(
         pairing.match_list_path.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in pairs))
         with _counted(database, "two_view_geometries", len(pairs), lambda share: report("matches", share)):
             pycolmap.match_image_pairs(database, pairing_options=pairing)
-        placed = iter(range(3, n + 1))
-        models = pycolmap.incremental_mapping(
-            database, images, folder, pipeline, next_image_callback=lambda: report("cameras", next(placed, n) / n)
-        )
-        model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
-        model = model and _adjusted(model)
+        search = _Search(images, folder, pipeline, lambda share: report("cameras", share))
+        model = search.best(database)
         if model is None or model.num_reg_images() < MIN_PHOTOS:
             if _count_keypoints(database) < LEAST_DETAIL * n:
                 raise InputError(
@@ -176,7 +182,11 @@ def reconstruct(
                 f"{photos[0].path.parent}: the photos do not fit together; take more, each with two thirds in common with "
                 f"the next, of an object that does not move on a table with a pattern{otherwise}"
             )
-    return _taken_out(model, len(models))
+        if not _are_possible(model):
+            note(
+                f"{photos[0].path.parent}: the cameras are uncertain; check prepare.html, and take more photos with one lens"
+            )
+    return _taken_out(model, search.n_models)
 
 
 def file_name(name: str) -> str:
@@ -192,19 +202,119 @@ def photo_pairs(n: int) -> list[tuple[int, int]]:
     return [(i, i + step) for i in range(n) for step in steps if i + step < n]
 
 
+@dataclass
+class _Search:
+    """The search for cameras from matched features, by more than one way where the first one's cameras are doubtful."""
+
+    images: Path
+    folder: Path
+    options: pycolmap.IncrementalPipelineOptions
+    report: Callable[[float], None]
+    n_models: int = 0
+
+    def best(self, database: Path) -> pycolmap.Reconstruction | None:
+        """The cameras with the lenses of a database; where these are doubtful, also with a lens for each photo, and then with
+        one for those of about one focal length: photos may have been zoomed or cut without a word in their files.
+        """
+        with closing(pycolmap.Database.open(database)) as base:
+            n = base.num_images()
+        best, lenses = self.mapped(database, n), self.folder / "lenses.db"
+        for _ in range(TRIES):
+            if best is not None and not _is_doubtful(best, n):
+                break
+            each = self.mapped(_with_lenses(database, lenses, lambda name: name), n)
+            if each is not None:
+                focal = {image.name: image.camera.focal_length_x for image in map(each.image, each.reg_image_ids())}
+                groups = _alike(focal)
+                alike = self.mapped(_with_lenses(database, lenses, lambda name: groups.get(name, name), focal), n)
+                best = max(best, each, alike, key=_rank)
+            self.options.random_seed = self.options.mapper.random_seed = self.options.random_seed + 1
+        lenses.unlink(missing_ok=True)
+        return best
+
+    def mapped(self, database: Path, n: int) -> pycolmap.Reconstruction | None:
+        """The largest model of n photos, adjusted; None where there is none."""
+        placed = iter(range(3, n + 1))
+        models = pycolmap.incremental_mapping(
+            database,
+            self.images,
+            self.folder,
+            self.options,
+            next_image_callback=lambda: self.report(next(placed, n) / n),
+        )
+        self.n_models = len(models)
+        model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
+        return model and _adjusted(model)
+
+
+def _with_lenses(
+    database: Path, target: Path, lens_of: Callable[[str], str], focal: dict[str, float] | None = None
+) -> Path:
+    """A copy of a database with a camera for the photos of one size whose names `lens_of` gives the same text; with focal
+    lengths to begin with, by name."""
+    shutil.copy(database, target)
+    with closing(pycolmap.Database.open(target)) as base:
+        before, made = {camera.camera_id: camera for camera in base.read_all_cameras()}, {}
+        for image in base.read_all_images():
+            key = image.camera_id, lens_of(image.name)
+            if key not in made:
+                camera = before[image.camera_id]
+                length = (focal or {}).get(image.name, camera.focal_length_x)
+                camera = pycolmap.Camera.create_from_model_id(0, camera.model, length, camera.width, camera.height)
+                camera.camera_id, rig = base.write_camera(camera), pycolmap.Rig()
+                rig.add_ref_sensor(camera.sensor_id)
+                made[key] = camera.camera_id, base.write_rig(rig)
+            image.camera_id, rig_id = made[key]
+            frame = pycolmap.Frame(frame_id=image.frame_id, rig_id=rig_id)
+            frame.add_data_id(image.data_id)
+            base.update_frame(frame), base.update_image(image)
+    return target
+
+
+def _alike(focal: dict[str, float]) -> dict[str, str]:
+    """For each photo the first one of those whose focal lengths lie together, by at most ONE_LENS from one to the next."""
+    names, first = sorted(focal, key=focal.get), {}
+    for before, name in zip([None, *names], names):
+        near = before is not None and focal[name] < (1 + ONE_LENS) * focal[before]
+        first[name] = first[before] if near else name
+    return first
+
+
+def _is_doubtful(model: pycolmap.Reconstruction, n: int) -> bool:
+    """Whether cameras may be wrong: some of n photos have none, they explain the features badly, or are no cameras."""
+    few, vague = model.num_reg_images() < (1 - FEW_LOST) * n, model.compute_mean_reprojection_error() > SURE
+    return few or vague or not _are_possible(model)
+
+
+def _are_possible(model: pycolmap.Reconstruction) -> bool:
+    """Whether the pixels of all placed photos are square and their focal lengths within FOCAL_RANGE."""
+    cameras = [model.image(key).camera for key in model.reg_image_ids()]
+    lengths = [(c.focal_length_x, c.focal_length_y, max(c.width, c.height)) for c in cameras]
+    least, most = FOCAL_RANGE
+    return all(abs(x - y) < ONE_LENS * x and least < x / size < most for x, y, size in lengths)
+
+
+def _rank(model: pycolmap.Reconstruction | None) -> tuple[bool, int]:
+    """What makes a model better than another one of the same photos: it explains more; lenses of its own must be worth it."""
+    if model is None:
+        return False, 0
+    return _are_possible(model), model.compute_num_observations() - OF_A_LENS * model.num_cameras()
+
+
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """The model with everything refined at once: the principal points too, which the mapping holds at the photos' centres, and
-    all of OPENCV's lens. Photos that show too few of the points lose their cameras.
+    all of OPENCV's lens where enough photos have it. Photos that show too few of the points lose their cameras.
 
     Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
     them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
     """
     shortest = SHORTEST if model.num_reg_images() > FEW else 2
-    for principal_points in (True, False):
+    photos_of = Counter(image.camera_id for image in map(model.image, model.reg_image_ids()))
+    often = [key for key, n in photos_of.items() if n >= MIN_PHOTOS]
+    for principal_points in (len(often) == len(photos_of), False):
         refined = pycolmap.Reconstruction(model)
-        for camera in refined.cameras.values():
-            f, *rest = camera.params
-            camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [f, f, *rest, 0.0, 0.0]
+        for key in often:
+            _in_opencv(refined.cameras[key])
         options, chosen = pycolmap.BundleAdjustmentOptions(), pycolmap.BundleAdjustmentConfig()
         options.refine_principal_point, options.print_summary = principal_points, False
         options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
@@ -223,7 +333,15 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
             break
     for key in [key for key in refined.reg_image_ids() if refined.images[key].num_points3D < LEAST_SEEN]:
         refined.deregister_frame(refined.images[key].frame_id)
+    for key in set(refined.cameras) - set(often):
+        _in_opencv(refined.cameras[key])
     return refined
+
+
+def _in_opencv(camera: pycolmap.Camera) -> None:
+    """Gives a camera of the model RADIAL that of OpenCV."""
+    f, *rest = camera.params
+    camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [f, f, *rest, 0.0, 0.0]
 
 
 def _is_central(camera: pycolmap.Camera) -> bool:
