@@ -32,7 +32,18 @@ from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.masks import dots_of, given_masks, mask_files
 from splitnerf_tools.capture.photographs import Photograph, find_photographs
 from splitnerf_tools.capture.photometry import find_exposures
-from splitnerf_tools.capture.poses import LEAST_SEEN, Lens, Reconstruction, _adjusted, _counted, _is_sound, _taken_out
+from splitnerf_tools.capture.poses import (
+    LEAST_SEEN,
+    Lens,
+    Reconstruction,
+    _adjusted,
+    _alike,
+    _are_possible,
+    _counted,
+    _is_doubtful,
+    _is_sound,
+    _taken_out,
+)
 from splitnerf_tools.capture.prepare import PrepareSettings, _upright_copies, _without_camera
 from splitnerf_tools.capture.surroundings import FAINT, HEIGHT, Shot, surroundings
 from splitnerf_tools.capture.undistorted import pinhole_of, undistort, without_vignetting
@@ -60,7 +71,7 @@ def found_scene(n: int = 12) -> tuple[Reconstruction, np.ndarray]:
     far = random.normal(size=(200, 3)) * 10 + 20
     points = np.concatenate([ball, table, far])
     names, seen = [f"p_{i:02d}" for i in range(n)], (np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
-    scene = Reconstruction(names, ring(n), [PLAIN] * n, points, *seen, error=0.3, n_models=1)
+    scene = Reconstruction(names, ring(n), [PLAIN] * n, points, *seen, error=0.3)
     return scene, np.arange(len(points)) < len(ball)
 
 
@@ -238,9 +249,23 @@ def test_a_camera_that_nearly_no_points_hold_is_none():
     weak = model.images[model.reg_image_ids()[3]]
     for index in weak.get_observation_point2D_idxs()[LEAST_SEEN - 1 :]:
         model.delete_observation(weak.image_id, int(index))
-    found = _taken_out(_adjusted(model), 1)
+    found = _taken_out(_adjusted(model))
     assert len(found.names) == 7 and weak.name not in found.names and found.photo_of.max() == 6
     assert np.allclose([astuple(lens) for lens in found.lenses], [1024, 768, 900, 900, 512, 384, 0.05, 0.01, 0, 0])
+
+
+@pytest.mark.parametrize("aspect, focal, possible", [(1.0, 300, True), (0.75, 300, False), (1.0, 60, False)])
+def test_cameras_are_possible_or_not(aspect, focal, possible):
+    model = pycolmap.synthesize_dataset(pycolmap.SyntheticDatasetOptions())
+    assert not _is_doubtful(model, model.num_reg_images()) and _is_doubtful(model, model.num_reg_images() + 1)
+    for camera in model.cameras.values():
+        size = camera.width / 300
+        camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [aspect * focal * size, focal * size, *[0.0] * 6]
+    assert _are_possible(model) == possible
+
+
+def test_focal_lengths_of_one_lens():
+    assert _alike({1: 400.0, 2: 560.0, 3: 410.0, 4: 555.0, 5: 404.0}) == {1: 1, 5: 1, 3: 1, 4: 4, 2: 4}
 
 
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])
@@ -322,6 +347,11 @@ def as_zoomed(image: np.ndarray, i: int) -> np.ndarray:
     return cv2.resize(near, (w, h), interpolation=cv2.INTER_CUBIC).astype(image.dtype) if i % 2 else image
 
 
+def as_squeezed(image: np.ndarray, i: int) -> np.ndarray:
+    """A picture brought to a square."""
+    return cv2.resize(image.astype(np.uint8), (300, 300), interpolation=cv2.INTER_AREA).astype(image.dtype)
+
+
 @pytest.mark.parametrize(
     ("given", "turntable", "held"),
     [
@@ -329,9 +359,10 @@ def as_zoomed(image: np.ndarray, i: int) -> np.ndarray:
         (True, True, as_whole),
         (True, False, as_held),
         (True, False, as_zoomed),
+        (True, False, as_squeezed),
         pytest.param(False, False, as_whole, marks=pytest.mark.slow),
     ],
-    ids=["around", "turntable", "three sizes", "zoomed", "masks to find"],
+    ids=["around", "turntable", "three sizes", "zoomed", "squeezed", "masks to find"],
 )
 def test_photos_to_data(tmp_path, capsys, monkeypatch, given, turntable, held):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""

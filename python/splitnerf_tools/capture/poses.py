@@ -49,7 +49,7 @@ FOCAL_RANGE = 0.3, 6.0  # focal lengths that are believed, in lengths of the pho
 ONE_LENS = 0.03  # most difference of two focal lengths of one lens, as a share
 OF_A_LENS = 20  # observations by which a further lens must be worth it
 # Pixels of reprojection and share of the photos without a camera from which on all cameras are doubted.
-SURE, FEW_LOST = 0.4, 0.05
+SURE, LOST = 0.4, 0.05
 TRIES = 2  # to find better ones
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
 
@@ -103,7 +103,6 @@ class Reconstruction:
         photo_of, point_of: [k] int64, the photo and the point of each observation.
         observed: [k, 2] float64, its place in the distorted photo in pixels; pixel centres at +0.5.
         error: Mean reprojection error in pixels.
-        n_models: Number of separate models that were found; this is the largest.
     """
 
     names: list[str]
@@ -114,7 +113,6 @@ class Reconstruction:
     point_of: np.ndarray
     observed: np.ndarray
     error: float
-    n_models: int
 
 
 def reconstruct(
@@ -151,6 +149,7 @@ def reconstruct(
     if moving is not None:
         reader.mask_path = moving
     pipeline.random_seed = pipeline.mapper.random_seed = seed
+    pipeline.structure_less_registration_fallback = False  # slow, and places photos that show none of the points
     for part in (pipeline, pipeline.mapper, pipeline.triangulation):
         part.min_focal_length_ratio, part.max_focal_length_ratio = FOCAL_RANGE
     n = len(photos)
@@ -170,8 +169,7 @@ def reconstruct(
         pairing.match_list_path.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in pairs))
         with _counted(database, "two_view_geometries", len(pairs), lambda share: report("matches", share)):
             pycolmap.match_image_pairs(database, pairing_options=pairing)
-        search = _Search(images, folder, pipeline, lambda share: report("cameras", share))
-        model = search.best(database)
+        model = _best_model(database, images, folder, pipeline, lambda share: report("cameras", share))
         if model is None or model.num_reg_images() < MIN_PHOTOS:
             if _count_keypoints(database) < LEAST_DETAIL * n:
                 raise InputError(
@@ -184,9 +182,10 @@ def reconstruct(
             )
         if not _are_possible(model):
             note(
-                f"{photos[0].path.parent}: the cameras are uncertain; check prepare.html, and take more photos with one lens"
+                f"{photos[0].path.parent}: the cameras are uncertain (pixels that are not square, or extreme angles of view); "
+                "check prepare.html, and give photos of one lens in the proportions that the camera gave them"
             )
-    return _taken_out(model, search.n_models)
+    return _taken_out(model)
 
 
 def file_name(name: str) -> str:
@@ -202,65 +201,59 @@ def photo_pairs(n: int) -> list[tuple[int, int]]:
     return [(i, i + step) for i in range(n) for step in steps if i + step < n]
 
 
-@dataclass
-class _Search:
-    """The search for cameras from matched features, by more than one way where the first one's cameras are doubtful."""
+def _best_model(
+    database: Path,
+    images: Path,
+    folder: Path,
+    options: pycolmap.IncrementalPipelineOptions,
+    report: Callable[[float], None],
+) -> pycolmap.Reconstruction | None:
+    """The largest model with the lenses of a database, adjusted. Where its cameras are doubtful, also one with pixels that need
+    not be square, one with a lens for each photo, and then one for those of about one focal length: photos may be squeezed,
+    zoomed or cut without a word in their files. The model that explains most is taken; further lenses must be worth it.
+    """
+    with closing(pycolmap.Database.open(database)) as base:
+        n = base.num_images()
 
-    images: Path
-    folder: Path
-    options: pycolmap.IncrementalPipelineOptions
-    report: Callable[[float], None]
-    n_models: int = 0
-
-    def best(self, database: Path) -> pycolmap.Reconstruction | None:
-        """The cameras with the lenses of a database; where these are doubtful, also with a lens for each photo, and then with
-        one for those of about one focal length: photos may have been zoomed or cut without a word in their files.
-        """
-        with closing(pycolmap.Database.open(database)) as base:
-            n = base.num_images()
-        best, lenses = self.mapped(database, n), self.folder / "lenses.db"
-        for _ in range(TRIES):
-            if best is not None and not _is_doubtful(best, n):
-                break
-            each = self.mapped(_with_lenses(database, lenses, lambda name: name), n)
-            if each is not None:
-                focal = {image.name: image.camera.focal_length_x for image in map(each.image, each.reg_image_ids())}
-                groups = _alike(focal)
-                alike = self.mapped(_with_lenses(database, lenses, lambda name: groups.get(name, name), focal), n)
-                best = max(best, each, alike, key=_rank)
-            self.options.random_seed = self.options.mapper.random_seed = self.options.random_seed + 1
-        lenses.unlink(missing_ok=True)
-        return best
-
-    def mapped(self, database: Path, n: int) -> pycolmap.Reconstruction | None:
-        """The largest model of n photos, adjusted; None where there is none."""
+    def mapped(source: Path) -> pycolmap.Reconstruction | None:
         placed = iter(range(3, n + 1))
-        models = pycolmap.incremental_mapping(
-            database,
-            self.images,
-            self.folder,
-            self.options,
-            next_image_callback=lambda: self.report(next(placed, n) / n),
-        )
-        self.n_models = len(models)
+        shown = {"next_image_callback": lambda: report(next(placed, n) / n)}
+        models = pycolmap.incremental_mapping(source, images, folder, options, **shown)
         model = max(models.values(), key=lambda found: found.num_reg_images(), default=None)
         return model and _adjusted(model)
 
+    def explained(model: pycolmap.Reconstruction | None) -> int:
+        return 0 if model is None else model.compute_num_observations() - OF_A_LENS * model.num_cameras()
+
+    best, lenses = mapped(database), folder / "lenses.db"
+    for turn in range(TRIES):
+        if best is not None and not _is_doubtful(best, n) and (turn or _are_possible(best)):
+            break
+        found = [best, mapped(_with_lenses(database, lenses, "OPENCV", {}))]
+        each = mapped(_with_lenses(database, lenses, "RADIAL", {photo: photo for photo in range(n + 1)}))
+        if each is not None:
+            focal = {key: each.image(key).camera.focal_length_x for key in each.reg_image_ids()}
+            found += [each, mapped(_with_lenses(database, lenses, "RADIAL", _alike(focal), focal))]
+        best = max(found, key=explained)
+        options.random_seed = options.mapper.random_seed = options.random_seed + 1
+    lenses.unlink(missing_ok=True)
+    return best
+
 
 def _with_lenses(
-    database: Path, target: Path, lens_of: Callable[[str], str], focal: dict[str, float] | None = None
+    database: Path, target: Path, model: str, lens_of: dict[int, int], focal: dict[int, float] | None = None
 ) -> Path:
-    """A copy of a database with a camera for the photos of one size whose names `lens_of` gives the same text; with focal
-    lengths to begin with, by name."""
+    """A copy of a database with a camera for the photos of one size and one lens by `lens_of`, with focal lengths to begin
+    with. Photos go by COLMAP's numbers."""
     shutil.copy(database, target)
     with closing(pycolmap.Database.open(target)) as base:
         before, made = {camera.camera_id: camera for camera in base.read_all_cameras()}, {}
         for image in base.read_all_images():
-            key = image.camera_id, lens_of(image.name)
+            key = image.camera_id, lens_of.get(image.image_id)
             if key not in made:
                 camera = before[image.camera_id]
-                length = (focal or {}).get(image.name, camera.focal_length_x)
-                camera = pycolmap.Camera.create_from_model_id(0, camera.model, length, camera.width, camera.height)
+                length = (focal or {}).get(image.image_id, camera.focal_length_x)
+                camera = pycolmap.Camera.create_from_model_name(0, model, length, camera.width, camera.height)
                 camera.camera_id, rig = base.write_camera(camera), pycolmap.Rig()
                 rig.add_ref_sensor(camera.sensor_id)
                 made[key] = camera.camera_id, base.write_rig(rig)
@@ -271,39 +264,38 @@ def _with_lenses(
     return target
 
 
-def _alike(focal: dict[str, float]) -> dict[str, str]:
+def _alike(focal: dict[int, float]) -> dict[int, int]:
     """For each photo the first one of those whose focal lengths lie together, by at most ONE_LENS from one to the next."""
-    names, first = sorted(focal, key=focal.get), {}
-    for before, name in zip([None, *names], names):
-        near = before is not None and focal[name] < (1 + ONE_LENS) * focal[before]
-        first[name] = first[before] if near else name
+    photos, first = sorted(focal, key=focal.get), {}
+    for before, photo in zip([None, *photos], photos):
+        near = before is not None and focal[photo] < (1 + ONE_LENS) * focal[before]
+        first[photo] = first[before] if near else photo
     return first
 
 
 def _is_doubtful(model: pycolmap.Reconstruction, n: int) -> bool:
-    """Whether cameras may be wrong: some of n photos have none, they explain the features badly, or are no cameras."""
-    few, vague = model.num_reg_images() < (1 - FEW_LOST) * n, model.compute_mean_reprojection_error() > SURE
-    return few or vague or not _are_possible(model)
+    """Whether cameras may be wrong: some of n photos have none, or they explain the features badly."""
+    return model.num_reg_images() < (1 - LOST) * n or model.compute_mean_reprojection_error() > SURE
 
 
 def _are_possible(model: pycolmap.Reconstruction) -> bool:
     """Whether the pixels of all placed photos are square and their focal lengths within FOCAL_RANGE."""
     cameras = [model.image(key).camera for key in model.reg_image_ids()]
-    lengths = [(c.focal_length_x, c.focal_length_y, max(c.width, c.height)) for c in cameras]
+    return all(
+        _is_in_range(c) and abs(c.focal_length_x - c.focal_length_y) < ONE_LENS * c.focal_length_x for c in cameras
+    )
+
+
+def _is_in_range(camera: pycolmap.Camera) -> bool:
+    """Whether a camera's focal length is within FOCAL_RANGE."""
     least, most = FOCAL_RANGE
-    return all(abs(x - y) < ONE_LENS * x and least < x / size < most for x, y, size in lengths)
-
-
-def _rank(model: pycolmap.Reconstruction | None) -> tuple[bool, int]:
-    """What makes a model better than another one of the same photos: it explains more; lenses of its own must be worth it."""
-    if model is None:
-        return False, 0
-    return _are_possible(model), model.compute_num_observations() - OF_A_LENS * model.num_cameras()
+    return least < camera.focal_length_x / max(camera.width, camera.height) < most
 
 
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     """The model with everything refined at once: the principal points too, which the mapping holds at the photos' centres, and
-    all of OPENCV's lens where enough photos have it. Photos that show too few of the points lose their cameras.
+    all of OPENCV's lens where enough photos have it. Photos that show too few of the points, or have a lens of
+    their own that is none, lose their cameras.
 
     Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
     them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
@@ -311,7 +303,7 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
     shortest = SHORTEST if model.num_reg_images() > FEW else 2
     photos_of = Counter(image.camera_id for image in map(model.image, model.reg_image_ids()))
     often = [key for key, n in photos_of.items() if n >= MIN_PHOTOS]
-    for principal_points in (len(often) == len(photos_of), False):
+    for principal_points in (True, False) if len(often) == len(photos_of) else (False,):
         refined = pycolmap.Reconstruction(model)
         for key in often:
             _in_opencv(refined.cameras[key])
@@ -329,10 +321,12 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
             points = refined.points3D.items()
             for key in [k for k, point in points if point.error > MAX_ERROR or point.track.length() < shortest]:
                 refined.delete_point3D(key)
-        if all(_is_central(camera) for camera in refined.cameras.values()):
+        if all(_is_central(refined.cameras[key]) for key in often):
             break
-    for key in [key for key in refined.reg_image_ids() if refined.images[key].num_points3D < LEAST_SEEN]:
-        refined.deregister_frame(refined.images[key].frame_id)
+    for image in map(refined.image, list(refined.reg_image_ids())):
+        alone = image.camera_id not in often
+        if image.num_points3D < LEAST_SEEN or (alone and not _is_in_range(image.camera)):
+            refined.deregister_frame(image.frame_id)
     for key in set(refined.cameras) - set(often):
         _in_opencv(refined.cameras[key])
     return refined
@@ -340,8 +334,9 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
 
 def _in_opencv(camera: pycolmap.Camera) -> None:
     """Gives a camera of the model RADIAL that of OpenCV."""
-    f, *rest = camera.params
-    camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [f, f, *rest, 0.0, 0.0]
+    if camera.model == pycolmap.CameraModelId.RADIAL:
+        f, *rest = camera.params
+        camera.model, camera.params = pycolmap.CameraModelId.OPENCV, [f, f, *rest, 0.0, 0.0]
 
 
 def _is_central(camera: pycolmap.Camera) -> bool:
@@ -350,7 +345,7 @@ def _is_central(camera: pycolmap.Camera) -> bool:
     return bool((np.abs(np.array(camera.params[2:4]) - size / 2) < CENTRAL * size).all())
 
 
-def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
+def _taken_out(model: pycolmap.Reconstruction) -> Reconstruction:
     numbers = {key: i for i, key in enumerate(sorted(model.points3D))}
     named = {unquote(Path(model.images[key].name).stem): model.images[key] for key in model.reg_image_ids()}
     poses, lenses, photo_of, point_of, observed = [], [], [], [], []
@@ -371,7 +366,6 @@ def _taken_out(model: pycolmap.Reconstruction, n_models: int) -> Reconstruction:
         np.array(point_of),
         np.array(observed),
         float(model.compute_mean_reprojection_error()),
-        n_models,
     )
 
 
