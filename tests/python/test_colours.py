@@ -7,9 +7,11 @@ import zlib
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from blender_data import write_exr
 from PIL import Image, ImageCms
 from splitnerf import errors
-from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, srgb_to_linear
+from splitnerf.data.colours import DISPLAY_P3, REC709
+from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, read_radiance, srgb_to_linear
 from splitnerf.relight.background import read_plate
 from splitnerf_tools.capture.photographs import find_photographs, read_upright
 
@@ -163,6 +165,24 @@ def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, stated):
     for read in (read_colours, read_upright):
         assert read(path)[2, 2] == pytest.approx(expected, abs=2)
     assert "primaries that are not sRGB's; they are brought to sRGB" in capsys.readouterr().err
+
+
+def test_primaries_of_an_exr_are_brought_to_srgb(tmp_path, capsys):
+    light, paths = np.float32([2.0, 0.5, 0.25]), []
+    for name, primaries in (("srgb", REC709), ("p3", DISPLAY_P3)):
+        paths.append(write_exr(tmp_path / f"{name}.exr", np.tile(light, (4, 4, 1)), primaries=primaries))
+    assert read_radiance(paths[0])[1, 1].tolist() == light.tolist() and not capsys.readouterr().err
+    assert read_radiance(paths[1])[1, 1] == pytest.approx(FROM_P3 @ light, abs=2e-3)
+    assert "primaries that are not sRGB's; they are brought to sRGB's (p3.exr)" in capsys.readouterr().err
+
+
+def test_a_damaged_statement_of_colours_is_said(tmp_path, capsys):
+    """A gamma with a wrong checksum, for which Pillow does not open the file."""
+    data = bytearray(with_chunk(png(np.full((4, 4, 3), 9, np.uint8)), b"gAMA", struct.pack(">I", 100000)))
+    data[data.index(b"gAMA") + 8] ^= 255
+    (tmp_path / "x.png").write_bytes(data)
+    assert (read_colours(tmp_path / "x.png") == 9).all()
+    assert "what photos state of their colours cannot be read; they count as sRGB (x.png)" in capsys.readouterr().err
 
 
 def test_an_unknown_colour_space_and_an_alpha_are_said(tmp_path, capsys):

@@ -368,12 +368,3 @@ def test_a_background_that_is_not_used_is_named(tmp_path, capsys):
         edit(tmp_path, lambda meta, name=name: meta["frames"][2].update(behind_path=name))
         with pytest.raises(InputError, match=f"{name}: {told}"):
             load_dataset(tmp_path)
-
-
-def test_other_primaries_are_named(tmp_path, capsys):
-    for name, primaries in (
-        ("same", (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)),
-        ("p3", (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)),
-    ):
-        read_radiance(write_exr(tmp_path / f"{name}.exr", np.ones((4, 4, 3), np.float32), primaries=primaries))
-        assert ("chromaticities of images are not used" in capsys.readouterr().err) == (name == "p3")

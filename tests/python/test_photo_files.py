@@ -109,3 +109,18 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     frames = sorted((tmp_path / "frames").iterdir())
     assert len(frames) == 3
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
+
+
+def test_a_video_that_is_cut_short_is_told_of(tmp_path, capsys):
+    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (320, 240))
+    for number in range(12):
+        writer.write(np.full((240, 320, 3), 20 * number, np.uint8))
+    writer.release()
+    data = bytearray((tmp_path / "v.avi").read_bytes())
+    start = [i for i in range(len(data)) if data[i : i + 4] == b"00dc"][7]
+    data[start : data.index(b"idx1")] = bytes(data.index(b"idx1") - start)
+    (tmp_path / "v.avi").write_bytes(data)
+    (tmp_path / "frames").mkdir()
+    write_frames(tmp_path / "v.avi", tmp_path / "frames", 6, lambda share: None)
+    assert "v.avi: cannot be read beyond frame 6 of 12" in capsys.readouterr().err
+    assert len(list((tmp_path / "frames").iterdir())) == 3

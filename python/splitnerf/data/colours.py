@@ -47,7 +47,7 @@ class Stated(NamedTuple):
 
 
 def stated_colours(path: Path) -> Stated:
-    """What a photo's file states of its colours; nothing where it cannot be read."""
+    """What a photo's file states of its colours; nothing, with a note, where that cannot be read."""
     try:
         with Image.open(path) as image:
             said, codes, (space, index) = (
@@ -55,7 +55,8 @@ def stated_colours(path: Path) -> Stated:
                 coded_space(path) if image.format == "PNG" else (),
                 exif_space(image),
             )
-    except Exception:  # of any kind where a file is damaged; who reads its pixels says so
+    except Exception:  # of any kind where a file is damaged
+        note_once(f"{path.parent}: what photos state of their colours cannot be read; they count as sRGB", path.name)
         return Stated()
     if codes:
         primaries = CODED_PRIMARIES.get(codes[0], REC709)
@@ -99,26 +100,43 @@ def to_srgb(codes: np.ndarray, path: Path) -> np.ndarray:
     return from_space(codes, stated.gamma, stated.primaries, path)
 
 
+def from_primaries(light: np.ndarray, primaries: tuple[float, ...], path: Path) -> np.ndarray:
+    """Linear colours [..., 3] in given primaries in those of Rec. 709, with a note; as they are where that is no difference, or the
+    primaries are none."""
+    matrix = _to_rec709(primaries, path)
+    if matrix is None:
+        return light
+    note_once(f"{path.parent}: images state primaries that are not sRGB's; they are brought to sRGB's", path.name)
+    return light @ matrix.T.astype(light.dtype)
+
+
+def _to_rec709(primaries: tuple[float, ...], path: Path) -> np.ndarray | None:
+    """:func:`to_rec709` of primaries that a file states; None where they are Rec. 709's or, with a note, none."""
+    if np.abs(np.subtract(primaries, REC709)).max() <= ALIKE:
+        return None
+    with np.errstate(all="ignore"):
+        matrix = to_rec709(primaries)
+    if np.isfinite(matrix).all() and np.abs(matrix).max() <= 10:
+        return matrix
+    note_once(f"{path.parent}: images state primaries that are none; they are not used", path.name)
+    return None
+
+
 def from_space(codes: np.ndarray, gamma: float, primaries: tuple[float, ...], path: Path) -> np.ndarray:
     """Colours whose light is a power of the values (of gamma 0: by sRGB's curve) in given primaries, as sRGB; as they are where
     that is about what sRGB is."""
-    is_curve, is_cube = gamma == 0 or 2.0 < gamma < 2.4, np.abs(np.subtract(primaries, REC709)).max() <= ALIKE
-    if is_curve and (is_cube or codes.shape[2] == 1):
-        return codes
-    with np.errstate(all="ignore"):
-        matrix = to_rec709(primaries)
-    if not np.isfinite(matrix).all() or np.abs(matrix).max() > 10:
-        note_once(f"{path.parent}: photos state primaries that are none; they are not used", path.name)
+    matrix = _to_rec709(primaries, path) if codes.shape[2] == 3 else None
+    if matrix is None and (gamma == 0 or 2.0 < gamma < 2.4):
         return codes
     most = np.iinfo(codes.dtype).max
     values = np.arange(most + 1, dtype=np.float32) / np.float32(most)
     light = values ** np.float32(gamma) if gamma else ops.shading.srgb_to_linear(torch.from_numpy(values)).numpy()
-    turned = matrix.T.astype(np.float32) if codes.shape[2] == 3 else np.eye(1, dtype=np.float32)
+    turned = np.eye(codes.shape[2], dtype=np.float32) if matrix is None else matrix.T.astype(np.float32)
     result = np.empty_like(codes)
     for top in range(0, len(codes), ROWS):
         mixed = np.clip(light[codes[top : top + ROWS]] @ turned, 0, 1)
         result[top : top + ROWS] = np.rint(most * ops.linear_to_srgb(torch.from_numpy(mixed)).numpy())
-    parts = ["" if gamma == 0 else f"the gamma {gamma:.4g}", "" if is_cube else "primaries that are not sRGB's"]
+    parts = ["" if gamma == 0 else f"the gamma {gamma:.4g}", "" if matrix is None else "primaries that are not sRGB's"]
     note_once(f"{path.parent}: photos state {' and '.join(filter(None, parts))}; they are brought to sRGB", path.name)
     return result
 

@@ -22,7 +22,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
-from splitnerf.data.colours import ALIKE, REC709, to_srgb
+from splitnerf.data.colours import from_primaries, to_srgb
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path, is_file
 
@@ -244,13 +244,10 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
             note_once(f"{path.parent}: channels of images are not used: {others}", path.name)
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
-        primaries = spec.getattribute("chromaticities")
-        if primaries is not None and np.abs(np.asarray(primaries) - REC709).max() > ALIKE:
-            note_once(
-                f"{path.parent}: the chromaticities of images are not used; their values count as sRGB's primaries",
-                path.name,
-            )
+        primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None
     pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
+    if primaries is not None and pixels.shape[2] >= 3:
+        pixels[..., :3] = from_primaries(pixels[..., :3], primaries, path)
     pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
     pixels = pixels[:: order[0], :: order[1]]
     if (top, left, height, width) != (0, 0, *pixels.shape[:2]):

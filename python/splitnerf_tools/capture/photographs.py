@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from PIL import ExifTags, Image
 from splitnerf.data.colours import to_srgb
-from splitnerf.errors import InputError, note_once, plain
+from splitnerf.errors import InputError, note, note_once, plain
 from splitnerf.files import atomic_path
 
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # silence: what cannot be read is told of by the program
@@ -23,6 +23,7 @@ HEIC = (".heic", ".heif")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
+WHOLE = 0.95  # share of the frames that a video states which a whole one has
 MAX_PIXELS = 2 * Image.MAX_IMAGE_PIXELS  # of Pillow
 T = Image.Transpose
 UPRIGHT = (T.FLIP_LEFT_RIGHT, T.ROTATE_180, T.FLIP_TOP_BOTTOM, T.TRANSPOSE, T.ROTATE_270, T.TRANSVERSE, T.ROTATE_90)
@@ -156,6 +157,8 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
             best, most = frame, sharp
         report((number + 1) / total)
     reader.release()
+    if number < WHOLE * total:
+        note(f"{video}: cannot be read beyond frame {number} of {total}; what was filmed after it is not used")
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

@@ -15,12 +15,12 @@ PACKAGES = {"pycolmap": "pycolmap", "cv2": "opencv-python-headless"}
 STEPS = {
     "frames": 0.02,
     "photos": 0.01,
-    "features": 0.08,
-    "matches": 0.06,
-    "cameras": 0.1,
+    "features": 0.06,
+    "matches": 0.14,
+    "cameras": 0.12,
     "exposures": 0.02,
-    "images": 0.02,
-    "masks": 0.69,
+    "images": 0.03,
+    "masks": 0.6,
 }
 GIVEN_MASKS = 0.02
 
@@ -74,9 +74,12 @@ def run(args: argparse.Namespace) -> int:
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed, args.turntable)
     with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM
+        most = 0.0
 
         def report(step: str, share: float) -> None:
-            bar.show(overall(step, share, args.masks is not None), step)
+            nonlocal most
+            most = max(most, overall(step, share, args.masks is not None))  # cameras may be searched for again
+            bar.show(most, step)
 
         try:
             result = prepare(args.photos, args.out, settings, report)
