@@ -12,7 +12,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
-from splitnerf.training import start
+from splitnerf.training import loop, start
 from splitnerf.training.loop import Training
 from splitnerf.training.start import (
     CLEAR_SHARE,
@@ -114,7 +114,7 @@ def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
     monkeypatch.setattr(start, "grey_photos", sized)
     monkeypatch.setattr(start, "FINE_PASSES", start.FINE_PASSES[-1:])
     monkeypatch.setattr(start, "FULL_FINE", 0.7)  # this box has thick walls
-    monkeypatch.setattr(start, "FOLLOWED", 0.6)  # one pass of three leaves the surface beside its place
+    monkeypatch.setattr(start, "TRIED_FOLLOWED", 0.6)  # one pass of three leaves the surface beside its place
     shape = start.start_shape(SimpleNamespace(height=300, width=size), hull(), preset("cpu"))
     if size < 200:
         assert shape is None
@@ -142,7 +142,7 @@ def test_what_a_mirror_shows_is_no_surface(mirrored, monkeypatch):
     monkeypatch.setattr(start, "PASSES", start.PASSES[1:4] + start.PASSES[5:])
     monkeypatch.setattr(start, "FULL", 0.7)  # this box has thick walls
     shape = start.start_shape(SimpleNamespace(height=50, width=50), hull(), preset("cpu"))
-    assert (shape is None) == mirrored
+    assert (shape is None or not shape.is_sure) == mirrored
 
 
 def test_windows_that_follow_a_surface_find_it_more_precisely(box_photos, found):
@@ -280,7 +280,7 @@ def test_a_field_takes_a_shape():
 
 
 def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
-    monkeypatch.setattr(start, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
+    monkeypatch.setattr(loop, "start_shape", lambda *_: shape_of_ball(16))  # the tiny photos are too few
     settings = {"surface.start": "stereo", "deterministic": True, "steps": 100}
     whole, part = tmp_path / "whole", tmp_path / "part"
     for run in (whole, part):
@@ -297,3 +297,17 @@ def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
     resumed = train_scene(load_dataset(data), config, part, resume=True)
     for ours, theirs in zip(resumed.model.parameters(), expected.model.parameters()):
         assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize(("radius", "of_sphere"), [(0.67, 1.3), (1.3, 0.67)])
+def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monkeypatch, radius, of_sphere):
+    """They show a ball of radius 0.67."""
+    shape = StartShape(ball(radius, n=16), torch.ones(16, 16, 16), BOX, is_sure=False)
+    monkeypatch.setattr(loop, "start_shape", lambda *_: shape)
+    config = tiny(**{"surface.start": "stereo", "steps": 600, "sphere_radius": of_sphere})
+    training = Training(load_dataset(data), config, tmp_path, torch.device("cpu"))
+    before = [x.clone() for x in training.model.parameters()]
+    training.begin()
+    is_kept = all(torch.equal(x, y) for x, y in zip(before, training.model.parameters()))
+    assert is_kept == (radius == 1.3) and (training.take_step.start is None) == is_kept
+    assert training.step == 0 and not list(tmp_path.iterdir())

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import tempfile
 import time
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from splitnerf.config import Config
@@ -34,9 +36,12 @@ from splitnerf.training.schedule import (
     progress_by,
     set_learning_rate,
 )
-from splitnerf.training.start import start_of
+from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
+# Steps of a first shape that is not sure, and of a sphere beside it; the run whose schedule they follow; and the share of the
+# run's time or steps that both may take.
+STEPS_OF_TRIALS, SCHEDULE_OF_TRIALS, SHARE_OF_TRIALS = 600, 6000, 0.1
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -96,7 +101,37 @@ class Training:
         elif c.surface.start == "stereo":
             note_once("the photos are compared to find a first shape")
             with same_bits(c.run.deterministic):
-                self.take_step.start = start_of(self.model, self.photos, self.grid.hull, self.generator)
+                shape = start_shape(self.photos, self.grid.hull, c)
+                if shape is not None and (shape.is_sure or self.explains_more(shape)):
+                    self.start_from(shape)
+
+    def start_from(self, shape: StartShape) -> None:
+        """Begins with a shape, to which the levels of the field that are open at first are fitted."""
+        self.model.open_levels(0.0)
+        fit_to(self.model.sdf_field, shape, self.generator, self.config)
+        self.take_step.start = shape
+
+    def explains_more(self, shape: StartShape) -> bool:
+        """Whether the photos are explained better after a few steps from a shape than after as many from a sphere."""
+        c = self.config
+        config = c.replace({"max_minutes": 0.0, "steps": SCHEDULE_OF_TRIALS})
+        most_seconds = SHARE_OF_TRIALS * 60.0 * c.training_minutes or math.inf
+        n_steps = min(STEPS_OF_TRIALS, max(1, int(SHARE_OF_TRIALS * c.run.steps)))
+        note_once("the first shape is not clear; a few steps from it and from a sphere are compared")
+        with tempfile.TemporaryDirectory() as folder, torch.random.fork_rng():
+            trials = [Training(self.dataset, config, Path(folder), self.model.device) for _ in range(2)]
+            trials[0].start_from(shape)
+            started, found = time.monotonic(), np.zeros((n_steps, 2))
+            for step in range(n_steps):
+                for trial in trials:
+                    with trial.take_step.running():
+                        trial.refresh()
+                        trial.advance(None)
+                found[step] = [trial.log.psnr or 0.0 for trial in trials]
+                if time.monotonic() - started > most_seconds:
+                    break
+            of_shape, of_sphere = found[step // 2 : step + 1].mean(0)
+        return of_shape > of_sphere
 
     @property
     def progress(self) -> float:

@@ -14,7 +14,6 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.fields import SdfField
 from splitnerf.ops import MeshScene
-from splitnerf.render.model import SceneModel
 from splitnerf.render.rays import image_rays
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.render.stereo import (
@@ -37,10 +36,12 @@ CENTRES = 0.2  # cells by which the nearest centre on the other side is farther 
 POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
-# Of the object's pixels that must be clear; finer windows are clear by chance, too.
-CLEAR_SHARE, CLEAR_SHARE_FINE = 0.25, 0.4
+# Of the object's pixels that must be clear; finer windows are clear by chance, too. A shape of fewer clear pixels is tried.
+CLEAR_SHARE, CLEAR_SHARE_FINE, TRIED_SHARE = 0.25, 0.4, 0.15
 FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing, and a sphere does as well or better
-FOLLOWED = 0.95  # part of the free windows' mean correlation that those which follow the result must have: measured 0.97 to 1.06, of boombox 0.84
+# Part of the free windows' mean correlation that those which follow the result must have: measured 0.97 to 1.06, of metal bowls and mugs
+# 0.83 to 0.89, of boombox 0.81 to 0.84. A shape of less is tried.
+FOLLOWED, TRIED_FOLLOWED = 0.95, 0.8
 FOLLOWING = 0.06, 0.0125  # reach and step of the depths next to the result
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
@@ -63,10 +64,11 @@ class StartShape:
         distance: [r, r, r] signed distances at the cells' centres over [x, y, z], scene units, negative inside.
         trust: [r, r, r] the correlation of the photos' windows that say so, in [0, 1].
         box: Half size of the cube that the cells cover, scene units.
+        is_sure: Whether the photos are clear about it.
     """
 
-    def __init__(self, distance: Tensor, trust: Tensor, box: float):
-        self.distance, self.trust, self.box = distance, trust, box
+    def __init__(self, distance: Tensor, trust: Tensor, box: float, is_sure: bool = True):
+        self.distance, self.trust, self.box, self.is_sure = distance, trust, box, is_sure
         self.near = (distance.abs() < NEAR_CELLS * self.cell).nonzero()  # [m, 3] cells by the surface
 
     @property
@@ -113,7 +115,7 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     there the windows follow the surface. Where small photos show no clear depths, large ones are asked, a few at first:
     the grain of clay shows near their own size alone. Objects without texture fit at all depths, and on glossy ones
     reflections look like surfaces behind the object, elsewhere in each photo: both begin with a sphere, in which shading and
-    outlines carve. So do objects that fill most of their hull.
+    outlines carve. So do objects that fill most of their hull. In between, as inside of metal, the shape is not sure.
 
     Args:
         photos: The photos of the training.
@@ -129,20 +131,20 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
             sizes[edge] = grey_photos(photos, hull.device, edge)
         return sizes[edge]
 
-    def is_clear(margins: Tensor, most: int, edge: int, share: float) -> bool:
-        return bool((margins > MARGIN).sum() > share * photos_of(edge).spread(most).masks.sum())
+    def clear_share(margins: Tensor, most: int, edge: int) -> float:
+        return float((margins > MARGIN).sum() / photos_of(edge).spread(most).masks.sum())
 
     first, most, probes, passes, full = FIRST_EDGE, MOST_VIEWS, MOST_VIEWS, PASSES, FULL
     depths, scores, margins = depth_maps(photos_of(first), hull, box)
-    free = scores
-    if not is_clear(margins, most, first, CLEAR_SHARE):
-        first, most, probes, passes, full = FINE_EDGE, FINE_VIEWS, FINE_PROBES, FINE_PASSES, FULL_FINE
-        if min(photos.height, photos.width) < 2 * EDGE:
-            return None
-        _, free, margins = depth_maps(photos_of(first), hull, box, probes)
-        if not is_clear(margins, probes, first, CLEAR_SHARE_FINE):
-            return None
-        depths, scores, _ = depth_maps(photos_of(first), hull, box, most)
+    free, clear = scores, clear_share(margins, most, first)
+    is_sure = clear > CLEAR_SHARE
+    if not is_sure and min(photos.height, photos.width) >= 2 * EDGE:
+        _, of_fine, margins = depth_maps(photos_of(FINE_EDGE), hull, box, FINE_PROBES)
+        if is_sure := clear_share(margins, FINE_PROBES, FINE_EDGE) > CLEAR_SHARE_FINE:
+            first, most, probes, passes, full = FINE_EDGE, FINE_VIEWS, FINE_PROBES, FINE_PASSES, FULL_FINE
+            free, (depths, scores, _) = of_fine, depth_maps(photos_of(first), hull, box, most)
+    if not is_sure and clear < TRIED_SHARE:
+        return None
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
     spread = photos_of(first).spread(most)
     solid = blurred(fused_distances(spread, depths, weights, hull, box, FIRST_TRUNCATION)[0], FIRST_BLUR)
@@ -158,15 +160,16 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
             solid, trust = fused_distances(grey.spread(most), depths, weights, hull, box, truncation, solid)
             solid = blurred(solid, blur)
         base = surface_depths(solid, box, photos_of(first))
-        if not followed(photos_of(first), base, free, probes):
+        alike = followed(photos_of(first), base, free, probes)
+        if alike < TRIED_FOLLOWED:
             return None
-        return StartShape(exact_distances(solid, box), trust, box)
+        return StartShape(exact_distances(solid, box), trust, box, is_sure and alike >= FOLLOWED)
     except EmptyMesh:
         return None
 
 
-def followed(photos: GreyPhotos, base: Tensor, free: Tensor, most: int) -> bool:
-    """Whether windows that follow a surface are about as much alike as those that face the camera, each at its best depth.
+def followed(photos: GreyPhotos, base: Tensor, free: Tensor, most: int) -> float:
+    """How much windows that follow a surface are alike, as a part of those that face the camera, each at its best depth.
 
     What a mirror shows fits at some depth in each photo, but no surface has all of these depths.
 
@@ -176,7 +179,7 @@ def followed(photos: GreyPhotos, base: Tensor, free: Tensor, most: int) -> bool:
     """
     scores, on_it = refined_depths(photos, base, *FOLLOWING, most)[1], base[spread_out(len(base), most)] > 0
     means = [float(x[on_it].clamp(min=0).mean()) for x in (scores, free)]
-    return means[0] >= FOLLOWED * means[1]
+    return means[0] / max(means[1], 1e-6)
 
 
 def blurred(distances: Tensor, cells: float) -> Tensor:
@@ -219,15 +222,6 @@ def exact_distances(distances: Tensor, box: float) -> Tensor:
     vertices, _ = surface_mesh(distances, box, 2 * len(distances))
     away[near], _ = cKDTree(vertices).query((np.argwhere(near) + 0.5) * cell - box)
     return torch.from_numpy(np.where(solid, -away, away).astype(np.float32)).to(distances.device)
-
-
-def start_of(model: SceneModel, photos: Dataset, hull: Tensor, generator: torch.Generator) -> StartShape | None:
-    """The result of :func:`start_shape`, to which the levels of the model's field that are open at first are fitted."""
-    model.open_levels(0.0)
-    shape = start_shape(photos, hull, model.config)
-    if shape is not None:
-        fit_to(model.sdf_field, shape, generator, model.config)
-    return shape
 
 
 def fit_to(field: SdfField, shape: StartShape, generator: torch.Generator, config: Config) -> None:
