@@ -11,7 +11,7 @@ from blender_data import write_exr
 from PIL import Image, ImageCms
 from splitnerf import errors
 from splitnerf.data.colours import DISPLAY_P3, REC709
-from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, read_radiance, srgb_to_linear
+from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, read_header, read_radiance, srgb_to_linear
 from splitnerf.relight.background import read_plate
 from splitnerf_tools.capture.photographs import find_photographs, read_upright
 
@@ -174,6 +174,34 @@ def test_primaries_of_an_exr_are_brought_to_srgb(tmp_path, capsys):
     assert read_radiance(paths[0])[1, 1].tolist() == light.tolist() and not capsys.readouterr().err
     assert read_radiance(paths[1])[1, 1] == pytest.approx(FROM_P3 @ light, abs=2e-3)
     assert "primaries that are not sRGB's; they are brought to sRGB's (p3.exr)" in capsys.readouterr().err
+
+
+def ultra_hdr(pixels: np.ndarray) -> bytes:
+    """A JPEG with a gain map of 4 behind it (Ultra HDR image format 1.0), as phones write them."""
+
+    def jpeg(image: np.ndarray, said: str) -> bytes:
+        data = io.BytesIO()
+        Image.fromarray(image).save(data, "jpeg", quality=95)
+        space = 'xmlns:hdrgm="http://ns.adobe.com/hdr-gain-map/1.0/" hdrgm:Version="1.0"'
+        xmp = f'<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"><rdf:Description rdf:about="" {space} {said}</rdf:RDF></x:xmpmeta>'
+        app1 = b"http://ns.adobe.com/xap/1.0/\0" + xmp.encode()
+        return b"\xff\xd8\xff\xe1" + struct.pack(">H", len(app1) + 2) + app1 + data.getvalue()[2:]
+
+    gains = 'hdrgm:GainMapMin="0" hdrgm:GainMapMax="2" hdrgm:Gamma="1" hdrgm:OffsetSDR="0.015625" hdrgm:OffsetHDR="0.015625" hdrgm:HDRCapacityMin="0" hdrgm:HDRCapacityMax="2" hdrgm:BaseRenditionIsHDR="False"/>'
+    gain_map = jpeg(np.full((16, 16), 255, np.uint8), gains)
+    items = [f'Item:Semantic="{what}" Item:Mime="image/jpeg"' for what in ("Primary", "GainMap")]
+    items[1] += f' Item:Length="{len(gain_map)}"'
+    listed = "".join(f'<rdf:li rdf:parseType="Resource"><Container:Item {item}/></rdf:li>' for item in items)
+    google = "http://ns.google.com/photos/1.0/container/"
+    said = f'xmlns:Container="{google}" xmlns:Item="{google}item/"><Container:Directory><rdf:Seq>{listed}</rdf:Seq></Container:Directory></rdf:Description>'
+    return jpeg(pixels, said) + gain_map
+
+
+def test_the_gain_map_of_a_phone_is_not_applied(tmp_path, capsys):
+    (tmp_path / "x.jpg").write_bytes(ultra_hdr(np.full((64, 64, 3), 128, np.uint8)))
+    assert read_header(tmp_path / "x.jpg").bits == 8
+    assert (read_colours(tmp_path / "x.jpg") == 128).all() and (read_upright(tmp_path / "x.jpg") == 128).all()
+    assert "the gain maps of photos are not used (x.jpg)" in capsys.readouterr().err
 
 
 def test_a_damaged_statement_of_colours_is_said(tmp_path, capsys):

@@ -332,6 +332,15 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
     source = oiio.ImageInput.open(str(path), config)
     if source is None:
         raise InputError(f"{name}: cannot be read as an image ({_reason(oiio)}); replace it")
+    if source.format_name() == "jpeg" and str(source.spec().format) != "uint8":  # Ultra HDR: the gain map was applied
+        source.close()
+        note_once(f"{path.parent}: the gain maps of photos are not used", path.name)
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "image"
+            copy.write_bytes(path.read_bytes().replace(b"hdrgm:", b"other:").replace(b"iso:ts:21496", b"iso:ts:other"))
+            with _opened(copy, name) as opened:
+                yield opened
+        return
     try:
         spec = _first_picture(source, path) if source.format_name() == "openexr" else source.spec()
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
