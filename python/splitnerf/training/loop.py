@@ -39,9 +39,9 @@ from splitnerf.training.schedule import (
 from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
-# Steps of a first shape that is not sure, and of a sphere beside it; the run whose schedule they follow; and the share of the
-# run's time or steps that both may take.
-STEPS_OF_TRIALS, SCHEDULE_OF_TRIALS, SHARE_OF_TRIALS = 600, 6000, 0.1
+# Steps of a first shape that is not sure, and of a sphere beside it; the run whose schedule they follow; the share of the run's time or
+# steps that they may take; and the decibels by which the shape must be better: one that is wrong leads for some hundred steps.
+STEPS_OF_TRIALS, SCHEDULE_OF_TRIALS, SHARE_OF_TRIALS, CLEARLY = 800, 6000, 0.15, 0.2
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -112,26 +112,25 @@ class Training:
         self.take_step.start = shape
 
     def explains_more(self, shape: StartShape) -> bool:
-        """Whether the photos are explained better after a few steps from a shape than after as many from a sphere."""
+        """Whether the photos are explained clearly better after some hundred steps from a shape than after as many from a
+        sphere; not where there is no time for them."""
         c = self.config
         config = c.replace({"max_minutes": 0.0, "steps": SCHEDULE_OF_TRIALS})
-        most_seconds = SHARE_OF_TRIALS * 60.0 * c.training_minutes or math.inf
-        n_steps = min(STEPS_OF_TRIALS, max(1, int(SHARE_OF_TRIALS * c.run.steps)))
-        note_once("the first shape is not clear; a few steps from it and from a sphere are compared")
+        n_steps = min(STEPS_OF_TRIALS, int(SHARE_OF_TRIALS * c.run.steps))
+        ends = time.monotonic() + (SHARE_OF_TRIALS * 60.0 * c.training_minutes or math.inf)
+        note_once("the first shape is not clear; some hundred steps from it and from a sphere are compared")
+        found = []
         with tempfile.TemporaryDirectory() as folder, torch.random.fork_rng():
             trials = [Training(self.dataset, config, Path(folder), self.model.device) for _ in range(2)]
             trials[0].start_from(shape)
-            started, found = time.monotonic(), np.zeros((n_steps, 2))
-            for step in range(n_steps):
+            while len(found) < n_steps and time.monotonic() < ends:
                 for trial in trials:
                     with trial.take_step.running():
                         trial.refresh()
                         trial.advance(None)
-                found[step] = [trial.log.psnr or 0.0 for trial in trials]
-                if time.monotonic() - started > most_seconds:
-                    break
-            of_shape, of_sphere = found[step // 2 : step + 1].mean(0)
-        return of_shape > of_sphere
+                found.append([trial.log.psnr or 0.0 for trial in trials])
+        of_shape, of_sphere = np.mean(found[-max(1, n_steps // 4) :] or [[0.0, 0.0]], axis=0)
+        return len(found) == n_steps and of_shape > of_sphere + CLEARLY
 
     @property
     def progress(self) -> float:
