@@ -29,10 +29,6 @@ class InputError(Exception):
         return plain(super().__str__())
 
 
-class CheckFailed(RuntimeError):
-    """A benchmark's subject gives wrong results, so that its time is meaningless."""
-
-
 def note(text: str) -> None:
     """Writes one line to stderr, which names a file and the values that were repaired or left out."""
     print(f"splitnerf: note: {plain(text)}", file=sys.stderr)

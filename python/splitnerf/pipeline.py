@@ -268,7 +268,7 @@ def score_run(
 
 
 def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
-    """report.html, where a plugin writes it."""
+    """report.html, where the tools are installed."""
     if (write_report := installed().write_report) is not None:
         write_report(run, model, evaluated, timings)
 

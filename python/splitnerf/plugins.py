@@ -1,7 +1,6 @@
-"""Plugins: packages beside this one that add commands to the program and do parts of its jobs.
+"""What the package ``splitnerf_tools`` beside this one adds to the program: commands, and parts of its jobs.
 
-A distribution names its plugin in the entry-point group ``splitnerf.commands``; what it names is a :class:`Plugin`. That of
-``splitnerf_tools``, which comes in the same wheel, is also found where the metadata are older than the sources.
+This package imports nothing of it: :func:`installed` looks for it when the program starts, and all but these parts works without.
 """
 
 from __future__ import annotations
@@ -9,16 +8,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Protocol
 
-from splitnerf.errors import note
-
-GROUP = "splitnerf.commands"
-BUNDLED = EntryPoint("tools", "splitnerf_tools.plugin:PLUGIN", GROUP)
 TITLES = ("data", "reconstruction", "results", "many runs", "this installation")  # of `splitnerf --help`, in order
 
 
@@ -51,20 +46,7 @@ class Plugin:
 
 @cache
 def installed() -> Plugin:
-    """All plugins as one: the commands of all, each hook of the first that has it. A note names one that cannot be loaded."""
-    points = {point.name: point for point in entry_points(group=GROUP)}
-    if find_spec(BUNDLED.module.partition(".")[0]) is not None:
-        points[BUNDLED.name] = BUNDLED
-    found = []
-    for point in points.values():
-        try:
-            found.append(point.load())
-        except (ImportError, AttributeError) as error:
-            note(f"without the plugin {point.value}, which cannot be loaded: {error}")
-    commands = {title: sum((plugin.commands.get(title, ()) for plugin in found), ()) for title in TITLES}
-    hooks = {
-        hook.name: next((f for plugin in found if (f := getattr(plugin, hook.name)) is not None), None)
-        for hook in fields(Plugin)
-        if hook.name != "commands"
-    }
-    return Plugin(commands, **hooks)
+    """What the tools add; nothing where they are not installed."""
+    if find_spec("splitnerf_tools") is None:
+        return Plugin()
+    return import_module("splitnerf_tools.plugin").PLUGIN

@@ -12,10 +12,9 @@ import pytest
 import torch
 from bench import operators, shading, split_sum, tables
 from splitnerf.cli import DONE, main
-from splitnerf.errors import CheckFailed
 from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
-from splitnerf_tools.bench.harness import interleaved
+from splitnerf_tools.bench.harness import CheckFailed, interleaved
 from splitnerf_tools.bench.prefilter import Truth, filtered_importance, harmonics, lobe_integral
 from splitnerf_tools.bench.subjects import LEFT_OUT, MapLight, leave_out, pyramid_of
 from torch.nn import functional as F

@@ -32,7 +32,7 @@ def kind(request, monkeypatch) -> type[Step]:
     return request.param
 
 
-def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
+def test_a_nan_pixel_stops_the_run(data, begun, kind):
     """The image came another way than through the reader."""
     run, before = begun
     dataset = load_dataset(data)
@@ -42,7 +42,7 @@ def test_a_nan_pixel_stops_the_run_and_is_named(data, begun, kind):
     dataset = replace(dataset, images=images)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trainer, "dataset_fingerprint", lambda _: resumed(load_dataset(data)))
-        with pytest.raises(Diverged, match=rf"loss is not finite \(colour.*image {dataset.frame_names[2]} \(1 of 2304"):
+        with pytest.raises(Diverged, match=r"loss is not finite \(colour"):
             train_scene(dataset, tiny(steps=4000, foreground_share=1.0), run, resume=True)
     goes_on(data, run, before)
 
@@ -185,8 +185,7 @@ def test_parameters_whose_sum_is_too_large_are_finite(stepped):
 
 def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
     """Whatever comes first, all that follows from it is bad as well."""
-    names = [f"{part} {frame}" for frame in "ab" for part in ("image", "pose of", "intrinsics of")]
-    names += [f"rays' {name}" for name in ("rays_o", "rays_d", "target", "background")] + ["parameter weight"]
+    names = [f"rays' {name}" for name in ("rays_o", "rays_d", "target", "background")] + ["parameter weight"]
     points = ("albedo", "radiance")
     names += [f"rendered {x}" for x in ("sdf", "gradients", "normals", "weights", *points, "mean", "opacity")]
 
@@ -195,17 +194,12 @@ def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
             return {name.removeprefix(start): x for name, x in values.items() if name.startswith(start)}
 
         values = {name: torch.full((3,), torch.nan if i >= first_bad else 1.0) for i, name in enumerate(names)}
-        arrays = {
-            part: [values[f"{prefix} {frame}"].numpy() for frame in "ab"]
-            for part, prefix in (("images", "image"), ("poses", "pose of"), ("intrinsics", "intrinsics of"))
-        }
         model = torch.nn.Module()
         model.weight = torch.nn.Parameter(values["parameter weight"])
         shaded = {name: values[f"rendered {name}"] for name in points}
         ray = SimpleNamespace(**of("rendered "), points=SimpleNamespace(_asdict=lambda: shaded))
-        dataset = SimpleNamespace(frame_names=["a", "b"], **arrays)
         terms = {"colour": 1.0, "mask": torch.inf, "metal": torch.nan}
-        return str(explain_loss(8, terms, dataset, model, SimpleNamespace(**of("rays' ")), ray))
+        return str(explain_loss(8, terms, model, SimpleNamespace(**of("rays' ")), ray))
 
     for i, name in enumerate(names):
         message = f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); "

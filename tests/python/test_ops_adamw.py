@@ -186,17 +186,11 @@ def test_states_pass_from_one_to_the_other_by_a_checkpoint(first, second):
             assert state["step"].dtype == torch.float32 and state["step"] == 10 - k
 
 
-def test_a_group_may_be_sparse_and_a_closure_is_called():
+def test_a_group_may_be_sparse():
     table, other = (torch.nn.Parameter(torch.ones(4, 2)) for _ in range(2))
     optimiser = AdamW([{"params": [table], "sparse": True}, {"params": [other]}], lr=0.1)
-
-    def closure():
-        optimiser.zero_grad()
-        loss = table[0].sum() + other[0].sum()
-        loss.backward()
-        return loss
-
-    assert optimiser.step(closure) == 4.0
+    (table[0].sum() + other[0].sum()).backward()
+    optimiser.step()
     assert (table[1:] == 1.0).all() and (table[0] < 1.0).all() and (other < 1.0).all()
     optimiser.load_state_dict(optimiser.state_dict())
     assert [group["sparse"] for group in optimiser.param_groups] == [True, False]
@@ -213,12 +207,9 @@ def test_a_copy_of_an_optimiser_goes_on():
     assert twin.param_groups[0]["params"][0][0, 0] < weight[0, 0]
 
 
-def test_states_that_cannot_be_gone_on_from_are_refused():
+def test_a_state_of_torch_brings_its_settings_and_leaves_those_it_does_not_have():
     weight = torch.nn.Parameter(torch.ones(3, 2))
-    ours = AdamW([{"params": [weight], "sparse": True}], lr=0.1)
-    for wrong in ("maximize", "amsgrad"):
-        with pytest.raises(ValueError, match=wrong):
-            ours.load_state_dict(torch.optim.AdamW([weight], lr=0.1, **{wrong: True}).state_dict())
+    ours = AdamW([weight], lr=0.1, sparse=True)
     ours.load_state_dict(torch.optim.AdamW([weight], lr=0.2).state_dict())
     assert ours.param_groups[0]["sparse"] and ours.param_groups[0]["lr"] == 0.2
 

@@ -6,7 +6,7 @@ from op_cases import BOX, CASES, HASH_SPEC, SDF_SPEC, field_rays, full_cells, ha
 from op_checks import DEVICES, check_error, generator, lib
 from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, hash_encode
-from splitnerf.ops.sdf import growth_for, sample_rays
+from splitnerf.ops.sdf import sample_rays
 
 each_device = pytest.mark.parametrize("device", DEVICES)
 
@@ -37,11 +37,6 @@ def test_module_opens_levels_one_by_one():
     assert grid.stored() is None
     grid.n_active = 1
     assert torch.equal(grid(x)[:, :2], full[:, :2]) and not grid(x)[:, 2:].any()
-
-
-def test_growth_leads_to_the_finest_resolution():
-    spec = HashGridSpec(n_levels=8, base_resolution=16, growth=growth_for(16, 512, 8))
-    assert [spec.levels()[0][0], spec.levels()[-1][0]] == [16, 512]
 
 
 def exact_inputs(device, n: int = 200) -> tuple:

@@ -23,6 +23,12 @@ def rendered(weights, edges, first_weights=None, first_edges=None):
     return Rendered(torch.zeros(1, 3), weights, edges[:, 1:], edges, *first)
 
 
+def test_the_grids_reach_from_their_coarsest_cells_to_their_finest():
+    field = RadianceField()
+    ends = [(levels[0][0], levels[-1][0]) for levels in (field.fine.spec.levels(), field.coarse.spec.levels())]
+    assert ends == [(16, 640), (16, 160)]
+
+
 def test_contraction():
     inside = torch.tensor([[0.3, -0.2, 0.5]])
     assert torch.equal(contracted(inside), inside)

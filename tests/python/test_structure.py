@@ -8,7 +8,7 @@ import pytest
 
 # From the top: a unit imports those of later groups only. Units of one group do not import each other.
 CORE = (
-    "train __main__; cli; pipeline; run_folder; training; evaluate refinement relight; export; render; fields config; data; "
+    "__main__; cli; pipeline; run_folder; training; evaluate refinement relight; export; render; fields config; data; "
     "ops devices files; _core memory plugins progress; errors"
 )
 TOOLS = "plugin; commands; batch bench capture demo inspection view; ablate doctor report separation synth; findings"

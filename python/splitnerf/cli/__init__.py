@@ -1,4 +1,4 @@
-"""The command line: one module a command, each with `add_parser` and `run`; plugins add commands.
+"""The command line: one module a command, each with `add_parser` and `run`; the tools add commands.
 
 Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted (state saved).
 """
@@ -50,7 +50,7 @@ def build_parser() -> Parser:
     groups = {}
     for title in TITLES:
         n_before = len(commands.choices)
-        for command in COMMANDS.get(title, ()) + installed().commands[title]:
+        for command in COMMANDS.get(title, ()) + installed().commands.get(title, ()):
             command.add_parser(commands)
         groups |= {name: title for name in list(commands.choices)[n_before : n_before + 1]}
     parser.formatter_class = partial(ProgramHelp, groups=groups)

@@ -134,7 +134,7 @@ def observers_of(args: argparse.Namespace, run: Path) -> list[AbstractContextMan
         found.append(TensorBoard(args.tensorboard))
     if args.view is not None:
         if (watch := installed().watch) is None:
-            raise InputError("--view: no plugin shows a training, see `splitnerf --help`; leave it out")
+            raise InputError("--view: the package splitnerf_tools, which shows a training, is not there; leave it out")
         found.append(watch(run.resolve().name, args.view))
     return found
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from splitnerf import _core
 from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, read_radiance
 from splitnerf.errors import InputError, note
 
@@ -69,11 +70,9 @@ def sample_environment(radiance: np.ndarray, directions: np.ndarray) -> np.ndarr
 
 def directions_of_texels(height: int) -> tuple[np.ndarray, np.ndarray]:
     """The directions [h, 2 h, 3] of the texels of an equirectangular map, and their solid angles [h, 2 h]."""
-    theta = (np.arange(height) + 0.5) * np.pi / height
-    phi = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
-    ring, up = np.sin(theta)[:, None], np.broadcast_to(np.cos(theta)[:, None], (height, 2 * height))
-    areas = np.broadcast_to(ring / ring.sum() * 2 * np.pi / height, up.shape)
-    return np.stack([ring * np.cos(phi), ring * np.sin(phi), up], axis=-1), areas
+    ring = np.sin((np.arange(height) + 0.5) * np.pi / height)[:, None]
+    areas = np.broadcast_to(ring / ring.sum() * 2 * np.pi / height, (height, 2 * height))
+    return _core.equirect_directions(height, 2 * height), areas
 
 
 def texels_of_directions(directions: np.ndarray, height: int) -> np.ndarray:

@@ -182,10 +182,9 @@ def area_average(pixels: np.ndarray, factor: int) -> np.ndarray:
     return blocks.mean(axis=(1, 3), dtype=np.float32).astype(pixels.dtype)
 
 
-def over_background(srgb: np.ndarray, alpha: np.ndarray, background: float = 1.0) -> np.ndarray:
-    """A straight-alpha image [..., 3] sRGB with coverage [...] over a grey background (1 is white), in sRGB values as
-    the protocol demands."""
-    return srgb * alpha[..., None] + background * (1 - alpha[..., None])
+def over_background(srgb: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """A straight-alpha image [..., 3] sRGB with coverage [...] over white, in sRGB values as the protocol demands."""
+    return srgb * alpha[..., None] + (1 - alpha[..., None])
 
 
 def straight_srgb(radiance: np.ndarray, alpha: np.ndarray) -> np.ndarray:

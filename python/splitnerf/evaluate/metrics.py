@@ -62,13 +62,6 @@ def scale_of_sums(sums: np.ndarray) -> np.ndarray:
     return np.where(square > 0, product / np.where(square > 0, square, 1), 1.0)
 
 
-def median_scale(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """The median per channel of truth / prediction; arguments as for `lsq_scale`, [C] float64, 1 without pixels."""
-    if len(prediction) == 0:
-        return np.ones(prediction.shape[1])
-    return np.median(truth / np.maximum(np.asarray(prediction, np.float64), 1e-6), axis=0)
-
-
 def angles_deg(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """[...] angles in degrees between unit vectors [..., 3], stable near 0 and 180: 2 atan2(|a - b|, |a + b|)."""
     a, b = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
@@ -106,16 +99,14 @@ def solid_angle_weights(height: int) -> np.ndarray:
     return (edges[:-1] - edges[1:]) / 2
 
 
-def mesh_distances(
-    mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES, seed: int = 0
-) -> tuple[float, float]:
+def mesh_distances(mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES) -> tuple[float, float]:
     """Chamfer distance and F-score between two surfaces in one frame, by `samples` points spread over each.
 
     Returns:
         The mean of both directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares
         of points that lie within 1 % of the diagonal of the truth's bounding box, in [0, 1].
     """
-    points, targets = (np.asarray(trimesh.sample.sample_surface(m, samples, seed=seed)[0]) for m in (mesh, truth))
+    points, targets = (np.asarray(trimesh.sample.sample_surface(m, samples, seed=0)[0]) for m in (mesh, truth))
     to_truth, _ = cKDTree(targets).query(points)
     to_mesh, _ = cKDTree(points).query(targets)
     threshold = F_SCORE_SHARE * np.linalg.norm(np.ptp(truth.bounds, axis=0))

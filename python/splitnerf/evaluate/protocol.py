@@ -15,7 +15,6 @@ from splitnerf.data.truth import OPAQUE, ViewTruth
 from splitnerf.evaluate import metrics
 from splitnerf.evaluate.lpips import Distance
 
-MEDIAN_PIXELS = 20_000  # a view contributes at most about twice as many ratios to the median
 SCORES = ("psnr", "ssim", "lpips")
 Prediction = dict[str, np.ndarray]
 
@@ -125,7 +124,7 @@ def scaled_scores(
     """Scores predictions with one free factor per channel for all views together; `views` is called twice.
 
     The factor is fitted in linear light over the foreground of all views, alpha > 0.9 in prediction and truth. `raw`
-    has no factor, `lsq` that of least squares (the headline), `median` the median of truth / prediction.
+    has no factor, `lsq` that of least squares (the headline).
 
     Returns:
         The scores (`psnr`, `ssim`, `lpips` of the headline, then the variants with their `scale` [3]), and the
@@ -175,12 +174,8 @@ def _albedo(
 
 
 def _scales(views: Iterable[ScaledView]) -> dict[str, np.ndarray]:
-    sums, samples = np.zeros((2, 3)), []
+    sums = np.zeros((2, 3))
     for view in views:
         mask = (view.alpha > OPAQUE) & (view.truth_alpha > OPAQUE)
-        x, y = view.prediction[mask], view.truth[mask]
-        sums += metrics.lsq_sums(x, y)
-        step = max(1, len(x) // MEDIAN_PIXELS)
-        samples.append((x[::step], y[::step]))
-    x, y = (np.concatenate(parts) for parts in zip(*samples))
-    return {"raw": np.ones(3), "lsq": metrics.scale_of_sums(sums), "median": metrics.median_scale(x, y)}
+        sums += metrics.lsq_sums(view.prediction[mask], view.truth[mask])
+    return {"raw": np.ones(3), "lsq": metrics.scale_of_sums(sums)}

@@ -11,7 +11,6 @@ Source: Mueller et al. 2022, section 3.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -237,11 +236,6 @@ register(
     fake=lambda positions, grad, *grid: grad.new_empty(_table_rows(grid), grad.shape[1] // grid[0]),
 )
 register("hash_encode_backward_positions", fake=lambda positions, *rest: positions.new_empty(positions.shape))
-
-
-def growth_for(base_resolution: int, finest_resolution: int, n_levels: int) -> float:
-    """The growth factor with which ``n_levels`` levels reach from the base to the finest resolution."""
-    return math.exp(math.log(finest_resolution / base_resolution) / max(1, n_levels - 1))
 
 
 class SdfNetwork(NamedTuple):

@@ -10,7 +10,7 @@ Source: Loshchilov and Hutter 2019, Algorithm 2; rows without gradient: Mueller 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor
@@ -203,20 +203,6 @@ class AdamW(torch.optim.Optimizer):
         self._copies = dict(copies or {})
         self.counted: list[Tensor] = []
 
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Loads moments and settings of this class or of torch.optim.AdamW; with the latter, groups keep their
-        ``sparse``.
-
-        Raises:
-            ValueError: The stored optimiser maximises or uses AMSGrad.
-        """
-        if any(group.get("maximize") or group.get("amsgrad") for group in state_dict["param_groups"]):
-            raise ValueError("AdamW: a state with maximize or amsgrad cannot be gone on from")
-        ours = [group["sparse"] for group in self.param_groups]
-        super().load_state_dict(state_dict)
-        for group, theirs, sparse in zip(self.param_groups, state_dict["param_groups"], ours):
-            group["sparse"] = theirs.get("sparse", sparse)
-
     def __setstate__(self, state: dict) -> None:
         super().__setstate__(state)
         self.__dict__.setdefault("_copies", {})
@@ -227,16 +213,13 @@ class AdamW(torch.optim.Optimizer):
             moments["step"] = moments["step"].cpu()
 
     @torch.no_grad()
-    def step(self, closure: Callable[[], Tensor] | None = None, allowed: Tensor | None = None) -> Tensor | None:
-        """Moves every parameter that has a gradient; first calls the closure, if any, and returns its loss.
+    def step(self, allowed: Tensor | None = None) -> None:
+        """Moves every parameter that has a gradient.
 
         ``allowed`` is a [] bool on the parameters' device: where it is false nothing moves, although the step counts. Nobody
         waits for it. Once it is known, :meth:`take_back` mends the count.
         """
-        loss, self.counted = None, []
-        if closure is not None:
-            with torch.enable_grad():
-                loss = closure()
+        self.counted = []
         together: dict[tuple, list[tuple[Tensor, dict]]] = {}  # what one call takes
         for group in self.param_groups:
             for param in group["params"]:
@@ -245,7 +228,6 @@ class AdamW(torch.optim.Optimizer):
                     together.setdefault(shared, []).append((param, group))
         for (_, _, betas, eps), members in together.items():
             self._step(members, *betas, eps, allowed)
-        return loss
 
     @staticmethod
     def take_back(counted: list[Tensor]) -> None:

@@ -221,11 +221,6 @@ class VisibilityCache:
         grids = self.vertices, self.normals, self.starts, self.order, self.radius
         return *grids, self.bits, hits, sent, self.directions
 
-    def n_bytes(self) -> int:
-        """The memory of all its tensors."""
-        tensors = (self.vertices, self.normals, self.directions, self.bits, self.hits, self.starts, self.order)
-        return sum(t.numel() * t.element_size() for t in tensors)
-
 
 @front(positions=1, normals=1, lobe_dirs=1, roughness=1)
 def cached_occlusion(

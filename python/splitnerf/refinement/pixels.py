@@ -71,21 +71,20 @@ class Pixels:
         return np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
 
 
-def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int, seed: int = 0) -> Pixels:
+def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int) -> Pixels:
     """Pixels of a split, photo by photo.
 
     Args:
         dataset: The split.
         choose: Returns the pixels [H, W] bool to take from the photo of a number.
         most: The number of pixels, about, beyond which a random share of them is taken: a pixel takes 43 bytes.
-        seed: The seed of that share.
     """
     chosen, count = [], 0
     for i in range(len(dataset)):
         mask = choose(i)
         chosen.append(np.packbits(mask))  # an eighth of a byte a pixel
         count += np.count_nonzero(mask)
-    share, random, size = min(1.0, most / max(count, 1)), np.random.default_rng(seed), dataset.height * dataset.width
+    share, random, size = min(1.0, most / max(count, 1)), np.random.default_rng(0), dataset.height * dataset.width
     white = linear_to_srgb((1 / per_channel(dataset.exposures)).astype(np.float32))
     parts = []
     for i, bits in enumerate(chosen):

@@ -270,9 +270,9 @@ def _summary(record: dict) -> dict:
         "outline_error": [outline[0], outline[-1]] if outline else None,
         "held_out_psnr": [decibels(error) for error in record["held_out"]],
         "delivered": record["delivered"],
-        "level": float(record.get("level", 1.0)),
-        "normal_texture": record.get("normal_texture", True),  # runs from before it could be left out
-        "detail": record.get("detail"),  # runs from before there was any
+        "level": float(record["level"]),
+        "normal_texture": record["normal_texture"],
+        "detail": record["detail"],
         "lamp": record["lamp"] is not None,
         "saturated": record["saturated"],
     }

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 import torch
 from torch import Tensor
 
-from splitnerf.data.dataset import Dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.render.renderer import RenderedRays
 from splitnerf.training.batches import Batch
@@ -22,7 +21,7 @@ class Diverged(RuntimeError):
     The rule:
         - Images whose pixels are NaN, infinite or outside [0, 1] are refused when they are read.
         - A loss that is not finite stops the run before the parameters move. The message names the loss's terms and
-          the first of their inputs that is not finite: images, cameras, parameters, rendered rays.
+          the first of what they come from that is not finite: rays, parameters, rendered rays.
         - A gradient that is not finite, or too large to be squared, skips the step: parameters and optimiser do not
           change (:meth:`splitnerf.training.step.Step.judge`). A message on stderr says so, and metrics.jsonl counts such steps as ``skipped``. The tenth in a row
           stops the run.
@@ -60,24 +59,20 @@ def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) 
         raise Diverged(f"step {step}: not finite: {found}; lower --set learning_rate and --resume")
 
 
-def explain_loss(
-    step: int, terms: dict[str, float], dataset: Dataset, model: SceneModel, batch: Batch, ray: RenderedRays
-) -> Diverged:
+def explain_loss(step: int, terms: dict[str, float], model: SceneModel, batch: Batch, ray: RenderedRays) -> Diverged:
     """The error for a loss that is not finite: it names the terms and, in order of the data flow, the first bad input.
 
     Args:
         step: The number of the step.
         terms: The values of the loss's terms by name.
-        dataset: The train split.
         model: The scene.
         batch, ray: The rays of the step, and their rendering; of one that is read late, those of a step after it, which
             nothing has moved.
     """
     bad = ", ".join(name for name, term in terms.items() if not math.isfinite(term))
-    found = first_not_finite(_data_flow(dataset, model, batch, ray)) or UNEXPLAINED
+    found = first_not_finite(_data_flow(model, batch, ray)) or UNEXPLAINED
     return Diverged(
-        f"step {step}: the loss is not finite ({bad}); first not finite: {found}; "
-        "repair the data, or lower --set learning_rate, and --resume"
+        f"step {step}: the loss is not finite ({bad}); first not finite: {found}; lower --set learning_rate and --resume"
     )
 
 
@@ -89,11 +84,7 @@ def _state(model: SceneModel, optimiser: torch.optim.Optimizer) -> Iterator[tupl
                 yield f"{key} of {name}", value
 
 
-def _data_flow(dataset: Dataset, model: SceneModel, batch: Batch, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
-    for i, name in enumerate(dataset.frame_names):
-        yield f"image {name}", torch.from_numpy(dataset.images[i])
-        yield f"pose of {name}", torch.from_numpy(dataset.poses[i])
-        yield f"intrinsics of {name}", torch.from_numpy(dataset.intrinsics[i])
+def _data_flow(model: SceneModel, batch: Batch, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
     yield from ((f"rays' {name}", getattr(batch, name)) for name in ("rays_o", "rays_d", "target", "background"))
     yield from ((f"parameter {name}", parameter) for name, parameter in model.named_parameters())
     yield from ((f"rendered {name}", getattr(ray, name)) for name in ("sdf", "gradients", "normals", "weights"))

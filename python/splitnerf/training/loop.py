@@ -230,7 +230,7 @@ class Training:
         """
         for numbers in self.take_step.unread() if read is None else read:
             if numbers.complete and not math.isfinite(numbers.loss):
-                raise explain_loss(numbers.step - 1, numbers.values, self.dataset, self.model, *self.take_step.newest)
+                raise explain_loss(numbers.step - 1, numbers.values, self.model, *self.take_step.newest)
             if numbers.n_rays == self.n_rays:  # else the newest count was chosen while this step was on its way
                 self.n_rays = next_ray_count(self.n_rays, numbers.counts.samples, self.config)
             self.seconds = time.monotonic() - self.started

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from numpy.typing import ArrayLike
-from splitnerf.errors import CheckFailed, InputError
+from splitnerf.errors import InputError
 from splitnerf.files import locked, refuse_others
 from torch import Tensor
 
@@ -22,6 +22,10 @@ from splitnerf_tools.bench.subjects import LEFT_OUT
 ROUNDS, QUICK_ROUNDS = 15, 7
 SHORTEST = 0.005  # seconds of one measurement; faster calls are repeated within it
 SETTLING = 0.004  # seconds of pause before each measurement, since threads of the call before still spin
+
+
+class CheckFailed(RuntimeError):
+    """A benchmark's subject gives wrong results, so that its time is meaningless."""
 
 
 class Quartiles(NamedTuple):

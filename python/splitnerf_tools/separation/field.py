@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import torch
 from splitnerf.ops import HashGrid, HashGridSpec
-from splitnerf.ops.sdf import growth_for
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-FINE = dict(n_levels=10, n_features=2, base_resolution=16, log2_table_size=17), 640  # the finest level's cells
-COARSE = dict(n_levels=5, n_features=2, base_resolution=16, log2_table_size=15), 160
+FIRST_CELLS = 16  # along an edge of the coarsest level
+FINE = dict(n_levels=10, n_features=2, base_resolution=FIRST_CELLS, log2_table_size=17), 640  # the finest level's cells
+COARSE = dict(n_levels=5, n_features=2, base_resolution=FIRST_CELLS, log2_table_size=15), 160
 WIDTH, FEATURES = 32, 15
 CORE = 0.7  # distance from a ray's point next to the origin within which its samples stand evenly, scene units
 NEAR, FAR = 0.1, 300.0  # distances from the camera, scene units
@@ -63,7 +63,7 @@ class RadianceField(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.fine, self.coarse = (
-            HashGrid(HashGridSpec(**shape, growth=growth_for(shape["base_resolution"], cells, shape["n_levels"])))
+            HashGrid(HashGridSpec(**shape, growth=math.exp(math.log(cells / FIRST_CELLS) / (shape["n_levels"] - 1))))
             for shape, cells in (FINE, COARSE)
         )
         self.trunk = nn.Sequential(

@@ -184,9 +184,9 @@ def read_entries(path: Path) -> tuple[dict, list[dict]]:
     return meta, entries
 
 
-def read_frame(entry: dict, meta: dict, index: int, path: Path, folder: Path | None = None) -> Frame:
-    """Frame `index` of a transforms file; its image is relative to `folder`, by default to the file's."""
-    image_path = listed_image(folder or path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
+def read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
+    """Frame `index` of a transforms file; its image is relative to the file's folder."""
+    image_path = listed_image(path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
     mask_path, behind_path = (
         None if entry.get(key) is None else listed_file(path.parent, str(entry[key]), path)
         for key in ("mask_path", "behind_path")
