@@ -26,7 +26,7 @@ class LightGatherer {
 
   // The rays of one point.
   struct Worker {
-    PathState path;
+    PathOffsets offsets;
     std::vector<int> numbers;  // of their directions
     std::vector<Vec> origins, directions;
     std::vector<Hit> hits;
@@ -41,7 +41,7 @@ class LightGatherer {
     if (n_rays == 0) return;
     scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n_rays, std::numeric_limits<float>::infinity(),
                          worker.hits.data());
-    paths_.pattern().start_pixel(static_cast<uint32_t>(point), worker.path.offsets);
+    paths_.pattern().start_pixel(static_cast<uint32_t>(point), worker.offsets);
     for (int ray = 0; ray < n_rays; ++ray) {
       const int i = worker.numbers[ray];
       const int64_t at = point * n_ + i;
@@ -49,7 +49,7 @@ class LightGatherer {
         out.visible[at] = 1.f;
         continue;
       }
-      const Vec sent = paths_.radiance(worker.directions[ray], worker.hits[ray], i, 1, worker.path);
+      const Vec sent = paths_.radiance(worker.directions[ray], worker.hits[ray], i, 1, worker.offsets);
       if (!std::isfinite(sum(sent))) {
         throw std::runtime_error("incoming_light: the light at point " + std::to_string(point) + " is not finite");
       }

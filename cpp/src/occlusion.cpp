@@ -45,12 +45,11 @@ template <class T> class FanTracer {
       : scene_(scene), height_(height), width_(width), environment_(environment), x_(padded_fan(most_rays)),
         y_(x_.size()), z_(x_.size()), active_(x_.size()), visible_(x_.size()) {}
 
-  Vec3<T> factor(Vec3<T> origin, T ahead, const RayFan<T>& fan) {
+  Vec3<T> factor(Vec3<T> origin, const RayFan<T>& fan) {
     const int64_t n = padded_fan(fan.n);
     kernels<T>().fan_directions(fan, x_.data(), y_.data(), z_.data(), active_.data());
     const Vec3<float> start{static_cast<float>(origin.x), static_cast<float>(origin.y), static_cast<float>(origin.z)};
-    scene_.trace_fan(start, x_.data(), y_.data(), z_.data(), n, static_cast<float>(ahead), active_.data(),
-                     visible_.data());
+    scene_.trace_fan(start, x_.data(), y_.data(), z_.data(), n, active_.data(), visible_.data());
     T sums[6];
     kernels<T>().fan_light(environment_, height_, width_, n, x_.data(), y_.data(), z_.data(), active_.data(),
                            visible_.data(), sums);
@@ -82,15 +81,14 @@ void occlusion_factors(const Scene& scene, const OcclusionOptions& options, int6
                        random_unit<T>(options.seed, counter, dimension + 1)};
       };
       const Vec3<T> normal = load3(normals + 3 * i), axis = load3(lobe_dirs + 3 * i);
-      const T ahead = options.along_ray ? T(options.offset) : T(0), up = T(options.offset) - ahead;
-      const Vec3<T> origin = load3(positions + 3 * i) + normal * up;
+      const Vec3<T> origin = load3(positions + 3 * i) + normal * T(options.offset);
       const auto fan = [&](const OrderedLattice<T>& lattice, uint32_t dimension, Vec3<T> about, T edge) {
         return RayFan<T>{
             lattice.u.data(), lattice.v.data(), lattice.n, shift(dimension), Frame<T>(about), edge, normal};
       };
       const T edge = ggx_lobe_edge(ggx_alpha_from_roughness(roughness[i]));
-      store3(occlusion_d + 3 * i, tracer.factor(origin, ahead, fan(diffuse, 0, normal, T(0))));
-      store3(occlusion_s + 3 * i, tracer.factor(origin, ahead, fan(specular, 2, axis, edge)));
+      store3(occlusion_d + 3 * i, tracer.factor(origin, fan(diffuse, 0, normal, T(0))));
+      store3(occlusion_s + 3 * i, tracer.factor(origin, fan(specular, 2, axis, edge)));
     }
   });
 }

@@ -18,11 +18,8 @@ namespace splitnerf {
 // Source: Veach 1997, Eq. (9.15).
 inline float mis_weight(float pdf, float other_pdf) { return 1.f / (1.f + square(other_pdf / pdf)); }
 
-// The random numbers of one path, and how many rays were traced.
-struct PathState {
-  std::vector<SamplePattern::Offset> offsets;
-  int64_t n_rays = 0;
-};
+// What sets the random numbers of a pixel's paths, or a point's, apart from those of others.
+using PathOffsets = std::vector<SamplePattern::Offset>;
 
 class PathIntegrator {
  public:
@@ -46,14 +43,13 @@ class PathIntegrator {
 
   // The light that leaves a hit against `direction`; 0 where there is none. `bounce` counts the scattering before.
   //   L = sum over vertices of throughput x (emission + light sampled there + light that the BSDF sample finds).
-  Vec radiance(Vec direction, Hit hit, int sample, int first_bounce, PathState& state,
+  Vec radiance(Vec direction, Hit hit, int sample, int first_bounce, const PathOffsets& offsets,
                ShadingPoint* first = nullptr) const {
     Vec radiance{0, 0, 0}, throughput{1, 1, 1};
     Vec origin{0, 0, 0};
     float bsdf_pdf = 0;
     for (int bounce = first_bounce;; ++bounce) {
       if (bounce > first_bounce) hit = scene_.trace_closest(origin, direction, kInfinity);
-      ++state.n_rays;
       if (hit.t < 0) {
         if (bounce > first_bounce) {
           const bool both = params_.light_sampling && !light_.black();
@@ -74,19 +70,19 @@ class PathIntegrator {
 
       if (params_.light_sampling && !light_.black()) {
         float light_pdf;
-        const Vec to_light = light_.sample(pattern_.get(state.offsets, sample, pair), &light_pdf);
+        const Vec to_light = light_.sample(pattern_.get(offsets, sample, pair), &light_pdf);
         // Nothing arrives from below the true surface, whatever the shading normal says.
         if (dot(to_light, point.geometric_normal) > 0) {
           const BsdfValue<float> f = bsdf.evaluate(frame.to_local(to_light));
-          if (f.pdf > 0 && !occluded(start, to_light, state)) {
+          if (f.pdf > 0 && !occluded(start, to_light)) {
             const float weight = mis_weight(light_pdf, f.pdf) / light_pdf;
             radiance += limited(throughput * f.f_cos * light_.radiance(to_light) * weight, bounce > 0);
           }
         }
       }
 
-      const Vec2<float> choice = pattern_.get(state.offsets, sample, pair + 2);
-      const Vec2<float> u = pattern_.get(state.offsets, sample, pair + 1);
+      const Vec2<float> choice = pattern_.get(offsets, sample, pair + 2);
+      const Vec2<float> u = pattern_.get(offsets, sample, pair + 1);
       const Vec next = bsdf.sample(choice.x, u.x, u.y);
       const BsdfValue<float> f = bsdf.evaluate(next);
       direction = normalize(frame.to_world(next));
@@ -102,10 +98,7 @@ class PathIntegrator {
     }
   }
 
-  bool occluded(Vec origin, Vec direction, PathState& state) const {
-    ++state.n_rays;
-    return scene_.occluded(origin, direction, kInfinity);
-  }
+  bool occluded(Vec origin, Vec direction) const { return scene_.occluded(origin, direction, kInfinity); }
 
  private:
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();

@@ -1,6 +1,5 @@
 #include "splitnerf/path_tracer.h"
 
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -25,7 +24,7 @@ constexpr int kCameraRays = 64;  // of a pixel, traced together
 
 // What one thread needs while it renders.
 struct Worker {
-  PathState path;
+  PathOffsets offsets;
   Vec origins[kCameraRays], directions[kCameraRays];
   Hit hits[kCameraRays];
 };
@@ -46,7 +45,7 @@ class PathTracer {
         paths_(scene, surface, environment, params, params.samples_per_pixel) {}
 
   void render_pixel(int64_t pixel, Worker& worker, const RenderTargets& out) const {
-    paths_.pattern().start_pixel(static_cast<uint32_t>(pixel), worker.path.offsets);
+    paths_.pattern().start_pixel(static_cast<uint32_t>(pixel), worker.offsets);
     const int spp = params_.samples_per_pixel, x = int(pixel % camera_.width), y = int(pixel / camera_.width);
     Vec3<double> radiance{}, albedo{}, normal{}, smooth_normal{};
     double roughness = 0, metallic = 0, depth = 0;
@@ -58,7 +57,7 @@ class PathTracer {
       if (params_.shadow_catcher && meets_catcher(worker.directions[k], worker.hits[k], sample, worker, &caught))
         continue;
       ShadingPoint first;
-      const Vec path = paths_.radiance(worker.directions[k], worker.hits[k], sample, 0, worker.path, &first);
+      const Vec path = paths_.radiance(worker.directions[k], worker.hits[k], sample, 0, worker.offsets, &first);
       if (!std::isfinite(sum(path))) {
         throw std::runtime_error("render: a path through pixel (" + std::to_string(x) + ", " + std::to_string(y) +
                                  ") has a radiance that is not finite");
@@ -97,36 +96,35 @@ class PathTracer {
   void trace_camera_rays(int x, int y, int first, int n, Worker& worker) const {
     for (int k = 0; k < n; ++k) {
       worker.origins[k] = camera_centre();
-      worker.directions[k] = camera_ray(x, y, paths_.pattern().get(worker.path.offsets, first + k, 0));
+      worker.directions[k] = camera_ray(x, y, paths_.pattern().get(worker.offsets, first + k, 0));
     }
     scene_.trace_closest(&worker.origins[0].x, &worker.directions[0].x, n, kInfinity, worker.hits);
   }
 
   // Whether the catcher hides the hit; then it has caught the light of one sample.
-  bool meets_catcher(Vec direction, const Hit& hit, int sample, Worker& worker, CaughtLight* caught) const {
+  bool meets_catcher(Vec direction, const Hit& hit, int sample, const Worker& worker, CaughtLight* caught) const {
     const Vec origin = camera_centre();
     const float t = (params_.catcher_height - origin.z) / direction.z;
     if (!(direction.z < 0 && t > 0 && (hit.t < 0 || t < hit.t))) return false;
-    ++worker.path.n_rays;
     catch_shadow(origin + direction * t, sample, worker, caught);
     return true;
   }
 
   // Irradiance of a point of the catcher by one light and one cosine sample. What is blocked is
   // compared with the same two samples unblocked: where nothing blocks, the ratio is exactly 1.
-  void catch_shadow(Vec position, int sample, Worker& worker, CaughtLight* caught) const {
+  void catch_shadow(Vec position, int sample, const Worker& worker, CaughtLight* caught) const {
     ++caught->n_samples;
     if (paths_.light().black()) return;
     const auto add = [&](Vec to_light, float pdf, float other_pdf) {
       if (!(to_light.z > 0) || !(pdf > 0)) return;
       const double light = luminance(paths_.light().radiance(to_light)) * to_light.z * mis_weight(pdf, other_pdf) / pdf;
       caught->open += light;
-      if (!paths_.occluded(position, to_light, worker.path)) caught->shadowed += light;
+      if (!paths_.occluded(position, to_light)) caught->shadowed += light;
     };
     float light_pdf;
-    const Vec to_light = paths_.light().sample(paths_.pattern().get(worker.path.offsets, sample, 1), &light_pdf);
+    const Vec to_light = paths_.light().sample(paths_.pattern().get(worker.offsets, sample, 1), &light_pdf);
     if (to_light.z > 0) add(to_light, light_pdf, pdf_cosine_hemisphere(to_light.z));
-    const Vec2<float> u = paths_.pattern().get(worker.path.offsets, sample, 2);
+    const Vec2<float> u = paths_.pattern().get(worker.offsets, sample, 2);
     const Vec up = sample_cosine_hemisphere(u.x, u.y);
     add(up, pdf_cosine_hemisphere(up.z), paths_.light().pdf(up));
   }
@@ -229,8 +227,8 @@ void check_surface(const char* caller, const Scene& scene, const Surface& surfac
   if (surface.material_ids) check_ids(check, scene, surface);
 }
 
-int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
-               const PathTracerParams& params, const RenderTargets& targets, const std::function<void()>& between) {
+void render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment, const Camera& camera,
+            const PathTracerParams& params, const RenderTargets& targets, const std::function<void()>& between) {
   const char* caller = "render";
   const Checks check{caller};
   check.require(camera.width > 0 && camera.height > 0, "camera width and height must be positive");
@@ -245,19 +243,16 @@ int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap&
   check.require(std::isfinite(params.catcher_height), "catcher_height must be finite");
 
   const PathTracer tracer(scene, surface, environment, camera, params);
-  std::atomic<int64_t> n_rays{0};
   const auto calling_thread = std::this_thread::get_id();
   auto next_call = std::chrono::steady_clock::now() + kPause;
   parallel_for_uneven(int64_t(camera.width) * camera.height, kPixelsPerTask, [&](int64_t begin, int64_t end) {
     Worker worker;
     for (int64_t pixel = begin; pixel < end; ++pixel) tracer.render_pixel(pixel, worker, targets);
-    n_rays += worker.path.n_rays;
     if (between && std::this_thread::get_id() == calling_thread && std::chrono::steady_clock::now() > next_call) {
       between();
       next_call = std::chrono::steady_clock::now() + kPause;
     }
   });
-  return n_rays;
 }
 
 }  // namespace splitnerf

@@ -127,7 +127,7 @@ Scene::Scene(const float* vertices, int64_t n_vertices, const int32_t* triangles
 }
 
 void Scene::trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
-                             const uint8_t* active, uint8_t* visible) const {
+                             uint8_t* visible) const {
   const RTCScene scene = embree_scene(impl_->tracer);
   parallel_for((n_rays + kPacket - 1) / kPacket, kPacketsPerTask, [&](int64_t begin, int64_t end) {
     alignas(64) RTCRay16 rays{};
@@ -135,8 +135,6 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
     for (int64_t packet = begin; packet < end; ++packet) {
       const int64_t first = packet * kPacket;
       const int count = load_packet(origins, directions, first, n_rays, t_far, rays, valid);
-      for (int k = 0; active && k < count; ++k)
-        if (!active[first + k]) mask_out(rays, valid, k);
       embree::occluded16(valid, scene, &rays);
       // Embree marks an occluded ray by tfar = -infinity.
       for (int k = 0; k < count; ++k) visible[first + k] = valid[k] == 0 || !(rays.tfar[k] < 0.f);
@@ -144,7 +142,7 @@ void Scene::trace_visibility(const float* origins, const float* directions, int6
   });
 }
 
-void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
+void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n,
                       const int32_t* active, int32_t* visible) const {
   const RTCScene scene = embree_scene(impl_->tracer);
   alignas(64) RTCRay16 rays{};
@@ -161,7 +159,7 @@ void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const 
       const bool traced = starts && fits(d);
       d = traced ? without_traces(d) : Vec3<float>{0.f, 0.f, 1.f};
       rays.dir_x[k] = d.x, rays.dir_y[k] = d.y, rays.dir_z[k] = d.z;
-      rays.tnear[k] = t_near, rays.tfar[k] = INFINITY, valid[k] = -1;
+      rays.tnear[k] = 0.f, rays.tfar[k] = INFINITY, valid[k] = -1;
       if (!traced || !active[first + k]) mask_out(rays, valid, k);
     }
     embree::occluded16(valid, scene, &rays);

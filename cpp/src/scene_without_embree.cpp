@@ -31,22 +31,21 @@ void Scene::trace_closest(const float* origins, const float* directions, int64_t
 }
 
 void Scene::trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
-                             const uint8_t* active, uint8_t* visible) const {
+                             uint8_t* visible) const {
   std::vector<Hit> hits(n_rays);
   trace_closest(origins, directions, n_rays, t_far, hits.data());
-  for (int64_t i = 0; i < n_rays; ++i) visible[i] = (active && !active[i]) || hits[i].t < 0.f;
+  for (int64_t i = 0; i < n_rays; ++i) visible[i] = hits[i].t < 0.f;
 }
 
-void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
+void Scene::trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n,
                       const int32_t* active, int32_t* visible) const {
   std::vector<float> origins(3 * n), directions(3 * n);
   std::vector<uint8_t> open(n);
   for (int64_t i = 0; i < n; ++i) {
-    const Vec3<float> w{x[i], y[i], z[i]};
-    store3(&origins[3 * i], origin + w * t_near);
-    store3(&directions[3 * i], w);
+    store3(&origins[3 * i], origin);
+    store3(&directions[3 * i], Vec3<float>{x[i], y[i], z[i]});
   }
-  trace_visibility(origins.data(), directions.data(), n, INFINITY, nullptr, open.data());
+  trace_visibility(origins.data(), directions.data(), n, INFINITY, open.data());
   for (int64_t i = 0; i < n; ++i) visible[i] = active[i] && !open[i] ? 0 : -1;
 }
 

@@ -59,7 +59,7 @@ void visibility_bits(const Scene& scene, int64_t n, const float* positions, cons
           hits[v * n_directions + above[k]] = heaviest_vertex(triangle, found[k]);
         }
       } else {
-        scene.trace_visibility(origins.data(), rays.data(), n_rays, INFINITY, nullptr, open.data());
+        scene.trace_visibility(origins.data(), rays.data(), n_rays, INFINITY, open.data());
       }
       for (int64_t k = 0; k < n_rays; ++k) {
         (open[k] ? open_words : blocked_words)[above[k] / kBitsPerWord] |= 1u << above[k] % kBitsPerWord;

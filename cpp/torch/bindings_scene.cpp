@@ -76,28 +76,27 @@ py::array_t<bool> trace_visibility(const PyScene& self, const py::object& origin
   py::array_t<bool> visible(o.shape(0));
   auto* out = reinterpret_cast<uint8_t*>(visible.mutable_data());
   py::gil_scoped_release release;
-  self.scene->trace_visibility(o.data(), d.data(), o.shape(0), t_far, nullptr, out);
+  self.scene->trace_visibility(o.data(), d.data(), o.shape(0), t_far, out);
   return visible;
 }
 
-py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions, float t_far) {
+py::tuple trace_closest(const PyScene& self, const py::object& origins, const py::object& directions) {
   const auto o = checked<float>("trace_closest", "origins", origins, {kAny, 3});
   const auto d = checked<float>("trace_closest", "directions", directions, {o.shape(0), 3});
   const py::ssize_t n = o.shape(0);
-  py::array_t<float> t(n), u(n), v(n);
+  py::array_t<float> u(n), v(n);
   py::array_t<int64_t> triangle(n);
   std::vector<Hit> hits(n);
   {
     py::gil_scoped_release release;
-    self.scene->trace_closest(o.data(), d.data(), n, t_far, hits.data());
+    self.scene->trace_closest(o.data(), d.data(), n, std::numeric_limits<float>::infinity(), hits.data());
   }
   for (py::ssize_t i = 0; i < n; ++i) {
-    t.mutable_data()[i] = hits[i].t;
     triangle.mutable_data()[i] = hits[i].t < 0 ? -1 : int64_t(hits[i].triangle);
     u.mutable_data()[i] = hits[i].u;
     v.mutable_data()[i] = hits[i].v;
   }
-  return py::make_tuple(t, triangle, u, v);
+  return py::make_tuple(triangle, u, v);
 }
 
 // The checked materials of a Surface, and what keeps their arrays alive.
@@ -208,12 +207,10 @@ py::dict render(const PyScene& self, const py::object& albedo, const py::object&
       allocate("radiance", 3),      allocate("alpha", 1),    allocate("albedo", 3),
       allocate("roughness", 1),     allocate("metallic", 1), allocate("normal", 3),
       allocate("smooth_normal", 3), allocate("depth", 1),    catcher_height ? allocate("shadow", 1) : nullptr};
-  int64_t n_rays;
   {
     py::gil_scoped_release release;
-    n_rays = splitnerf::render(*self.scene, surface, light, camera, params, targets, raise_what_signals_ask);
+    splitnerf::render(*self.scene, surface, light, camera, params, targets, raise_what_signals_ask);
   }
-  images["rays"] = n_rays;
   return images;
 }
 
@@ -251,20 +248,15 @@ void trace_with_embreex(const Scene& scene, std::shared_ptr<void>& tracer, const
 void bind_scene(py::module_& m) {
   splitnerf::set_trace_callback(trace_with_embreex);
 
-  constexpr float infinity = std::numeric_limits<float>::infinity();
   py::class_<PyScene>(
       m, "Scene", "A triangle mesh ready for ray tracing: vertices [n, 3] float32, triangles [m, 3] int32 (copied).")
       .def(py::init<const py::object&, const py::object&>(), py::arg("vertices"), py::arg("triangles"))
       .def_readonly("handle", &PyScene::handle, "The integer that names the scene to torch operators while it lives.")
-      .def_property_readonly("n_vertices", [](const PyScene& s) { return s.scene->n_vertices(); })
-      .def_property_readonly("n_triangles", [](const PyScene& s) { return s.scene->n_triangles(); })
-      .def("trace_visibility", &trace_visibility, py::arg("origins"), py::arg("directions"),
-           py::arg("t_far") = infinity,
+      .def("trace_visibility", &trace_visibility, py::arg("origins"), py::arg("directions"), py::arg("t_far"),
            "[n] bool: True where the segment origin + t direction, t in (0, t_far), meets nothing.\n\n"
            "origins, directions: [n, 3] float32. Neighbours in the arrays should be neighbours in space.")
-      .def("trace_closest", &trace_closest, py::arg("origins"), py::arg("directions"), py::arg("t_far") = infinity,
-           "The nearest hits as (t [n] float32, triangle [n] int64, u [n], v [n]); t = triangle = -1 for a "
-           "miss.\n\n"
+      .def("trace_closest", &trace_closest, py::arg("origins"), py::arg("directions"),
+           "The nearest hits as (triangle [n] int64, u [n] float32, v [n] float32); triangle = -1 for a miss.\n\n"
            "u and v are the barycentric coordinates of the triangle's second and third vertex.");
 
   py::class_<PyMaterials>(
@@ -284,7 +276,7 @@ void bind_scene(py::module_& m) {
       "and out.\n\n"
       "albedo [n_vertices, 3], roughness and metallic [n_vertices] in [0, 1], linear, are multiplied with what the\n"
       "materials say. normals: [n_vertices, 3], or None for flat shading. Maps of the first hit are means over the\n"
-      "sub-samples that hit. The result holds rays, too, their number.");
+      "sub-samples that hit.");
 
   m.def(
       "pixel_filter_offsets", &pixel_filter_offsets, py::arg("u"), py::arg("pixel_filter") = "blackman-harris",

@@ -53,7 +53,7 @@ Tensor prefilter_light_backward(Tensor query_dirs, Tensor roughness, Tensor tota
 
 std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Tensor normals, Tensor lobe_dirs,
                                              Tensor roughness, Tensor environment, int64_t n_diffuse_rays,
-                                             int64_t n_specular_rays, double offset, bool along_ray, int64_t seed) {
+                                             int64_t n_specular_rays, double offset, int64_t seed) {
   const char* op = "occlusion_factors";
   const Kind type = real_kind(op, "positions", positions);
   const Tensor x = checked(op, "positions", positions, {kAny, 3}, type);
@@ -67,7 +67,7 @@ std::tuple<Tensor, Tensor> occlusion_factors(int64_t scene, Tensor positions, Te
   require(n_diffuse_rays > 0 && n_specular_rays > 0 && n_diffuse_rays <= 1 << 20 && n_specular_rays <= 1 << 20, op,
           "n_diffuse_rays and n_specular_rays must be in [1, 2^20]");
   const OcclusionOptions options{static_cast<int>(n_diffuse_rays), static_cast<int>(n_specular_rays),
-                                 static_cast<float>(offset), static_cast<uint32_t>(seed), along_ray};
+                                 static_cast<float>(offset), static_cast<uint32_t>(seed)};
   Tensor o_d = empty_like_type(x, {x.size(0), 3}, type), o_s = empty_like_type(x, {x.size(0), 3}, type);
   const auto mesh = get_scene(scene);
   dispatch_real(type, [&](auto zero) {
@@ -106,7 +106,7 @@ SPLITNERF_OPERATORS(op) {
 // Rays are traced on the CPU.
 SPLITNERF_CPU_OPERATORS(op) {
   op(SPLITNERF_OP(occlusion_factors),
-     "scene positions normals lobe_dirs roughness environment n_diffuse_rays n_specular_rays offset along_ray seed");
+     "scene positions normals lobe_dirs roughness environment n_diffuse_rays n_specular_rays offset seed");
 }
 
 }  // namespace splitnerf::glue

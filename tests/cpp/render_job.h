@@ -13,7 +13,6 @@ namespace splitnerf {
 
 struct Image {
   std::vector<float> radiance, alpha, albedo, roughness, metallic, normal, smooth_normal, depth, shadow;
-  int64_t n_rays = 0;
   RenderTargets targets(size_t n) {
     for (auto* image : {&radiance, &albedo, &normal, &smooth_normal}) image->assign(n * 3, -1.f);
     for (auto* image : {&alpha, &roughness, &metallic, &depth, &shadow}) image->assign(n, -1.f);
@@ -42,8 +41,7 @@ struct RenderJob {
     adapt(surface);
     Image image;
     const RenderTargets targets = image.targets(size_t(camera.width) * camera.height);
-    image.n_rays =
-        splitnerf::render(make_scene(mesh), surface, {map.data(), map_height, map_width}, camera, params, targets);
+    splitnerf::render(make_scene(mesh), surface, {map.data(), map_height, map_width}, camera, params, targets);
     return image;
   }
   void set_map(int height, int width, const std::function<float(Vec3<float>)>& radiance) {

@@ -227,18 +227,5 @@ TEST(ShadowCatcher, NothingBlockedIsExactlyClearAndTheObjectCoversTheRest) {
   for (const float value : job.render().shadow) EXPECT_EQ(value, 0);
 }
 
-TEST(PathTracer, CountsItsRays) {
-  RenderJob job = sphere_setup(8);
-  job.params.samples_per_pixel = 3;
-  job.camera = look_at_origin({30, 0, 0}, 8, 0.5f);
-  job.set_map(2, 4, [](Vec) { return 0.f; });  // black: no shadow rays
-  job.params.max_bounces = 0;
-  // Every camera ray hits; the BSDF's ray leaves the convex sphere, unless the sample is below.
-  EXPECT_LE(job.render().n_rays, 2 * 3 * 64);
-  EXPECT_GT(job.render().n_rays, 1.8 * 3 * 64);
-  job.camera.camera_to_world[3] = -30;  // looking away from the sphere
-  EXPECT_EQ(job.render().n_rays, 3 * 64);
-}
-
 }  // namespace
 }  // namespace splitnerf

@@ -213,7 +213,7 @@ def traced_points(n: int = 9) -> tuple:
 
 def occlusion_inputs() -> tuple:
     roughness, sky = (rand(*k, dtype=torch.float32) for k in ((9, 1), (8, 16, 3)))
-    return floor_under_a_ball().handle, *traced_points(), roughness, sky, 16, 16, OFFSET, False, 3
+    return floor_under_a_ball().handle, *traced_points(), roughness, sky, 16, 16, OFFSET, 3
 
 
 def incoming_inputs() -> tuple:

@@ -81,15 +81,3 @@ def test_seed_and_channels(scene):
     check_error(
         lambda: occlusion_factors(scene, **inputs, n_channels=2), "occlusion_factors", "n_channels", "1 or 3", "2"
     )
-
-
-def test_rays_that_start_along_themselves():
-    """Under a plane at 0.02, offset 0.05: from off the surface all is open; along the ray only what has left the plane
-    behind, cos > 0.4, which is 1 - 0.4^2 of the cosine-weighted sky."""
-    plane = trimesh.Trimesh([[-9, -9, 0.02], [9, -9, 0.02], [9, 9, 0.02], [-9, 9, 0.02]], [[0, 1, 2], [0, 2, 3]])
-    up, white = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(4, 8, 3)
-    light = {"lobe_dirs": up, "roughness": torch.ones(1, 1), "environment": white}
-    for along_ray, expected in ((False, 1.0), (True, 0.84)):
-        settings = {"n_diffuse_rays": 4096, "offset": 0.05, "along_ray": along_ray}
-        o_d, _ = occlusion_factors(scene_of(plane), 0 * up, up, **light, **settings)
-        assert o_d.item() == pytest.approx(expected, abs=0.01)

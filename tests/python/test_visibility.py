@@ -38,7 +38,7 @@ def test_bits_and_hits_are_those_of_single_rays():
     assert torch.equal(visibility_bits(scene, x, n, w, OFFSET)[0], bits)
 
     single = _core.Scene(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32))
-    _, triangle, u, v = single.trace_closest(origins.reshape(-1, 3).numpy(), w.repeat(len(x), 1).numpy())
+    triangle, u, v = single.trace_closest(origins.reshape(-1, 3).numpy(), w.repeat(len(x), 1).numpy())
     blocked = blocked.reshape(-1)
     weights = np.stack([1 - u - v, u, v], axis=1)[blocked]
     heaviest = np.asarray(mesh.faces)[triangle[blocked], weights.argmax(1)]

@@ -11,7 +11,6 @@ struct OcclusionOptions {
   int n_specular_rays;  // D(w)(w.d)+ about the lobe's axis d
   float offset;         // rays start this far from the surface along n, scene units
   uint32_t seed;
-  bool along_ray = false;  // they start as far along themselves
 };
 
 inline constexpr double kBlackLight = 1e-4;

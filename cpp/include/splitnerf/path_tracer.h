@@ -98,11 +98,11 @@ struct RenderTargets {
   float* shadow;
 };
 
-// Returns the number of rays that were traced. Throws std::invalid_argument for unusable inputs and
-// std::runtime_error for a path whose radiance is not finite. The calling thread calls `between` after every 64
-// pixels, but at most ten times a second; what that throws ends the rendering.
-SPLITNERF_API int64_t render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
-                             const Camera& camera, const PathTracerParams& params, const RenderTargets& targets,
-                             const std::function<void()>& between = {});
+// Throws std::invalid_argument for unusable inputs and std::runtime_error for a path whose radiance is not finite. The
+// calling thread calls `between` after every 64 pixels, but at most ten times a second; what that throws ends the
+// rendering.
+SPLITNERF_API void render(const Scene& scene, const Surface& surface, const EnvironmentMap& environment,
+                          const Camera& camera, const PathTracerParams& params, const RenderTargets& targets,
+                          const std::function<void()>& between = {});
 
 }  // namespace splitnerf

@@ -29,15 +29,14 @@ class SPLITNERF_API Scene {
   // Rays that are not finite, or whose numbers exceed 1e12 (t_far aside), meet nothing.
 
   // visible[i] = 1 where the segment origin + t direction, t in (0, t_far), meets no triangle.
-  // Rays go in packets of 16: neighbours in the arrays should be neighbours in space. A ray
-  // that is masked out (active[i] == 0; active may be null) is reported as visible.
+  // Rays go in packets of 16: neighbours in the arrays should be neighbours in space.
   void trace_visibility(const float* origins, const float* directions, int64_t n_rays, float t_far,
-                        const uint8_t* active, uint8_t* visible) const;
+                        uint8_t* visible) const;
 
   // The same for rays from one point, directions one array a component; n is a multiple of 16. active[i] is -1, or 0 for a
-  // ray that is masked out; visible[i] is 0 where something is in the way in (t_near, infinity), else -1.
-  void trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, float t_near,
-                 const int32_t* active, int32_t* visible) const;
+  // ray that is masked out; visible[i] is 0 where something is in the way, else -1.
+  void trace_fan(Vec3<float> origin, const float* x, const float* y, const float* z, int64_t n, const int32_t* active,
+                 int32_t* visible) const;
 
   // The nearest hit of each ray with t in (0, t_far); packets of 16 here too.
   void trace_closest(const float* origins, const float* directions, int64_t n_rays, float t_far, Hit* hits) const;

@@ -53,7 +53,7 @@ def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
         y, x = np.mgrid[start : min(start + rows, size), 0:size].reshape(2, -1)
         origins = np.column_stack([x + 0.5, y + 0.5, np.ones(len(x))]).astype(np.float32)
         down = np.broadcast_to(np.float32([0, 0, -1]), origins.shape).copy()
-        _, triangle, u, v = scene.trace_closest(origins, down)
+        triangle, u, v = scene.trace_closest(origins, down)
         hit = triangle >= 0
         weights = np.column_stack([1 - u - v, u, v])[hit]
         yield Texels(start * size + np.flatnonzero(hit), triangle[hit], weights)

@@ -60,7 +60,7 @@ class MeshScene:
         Returns:
             triangle [n] int64, -1 for a miss, and barycentric coordinates u, v [n] of its second and third corner.
         """
-        return self._scene.trace_closest(origins, directions)[1:]
+        return self._scene.trace_closest(origins, directions)
 
     def is_open(self, origins: Tensor, directions: Tensor, t_far: float = math.inf) -> Tensor:
         """Whether each ray meets no triangle.
@@ -89,7 +89,6 @@ def occlusion_factors(
     n_diffuse_rays: int = 64,
     n_specular_rays: int = 64,
     offset: float = 0.0125,
-    along_ray: bool = False,
     seed: int = 0,
     n_channels: int = 1,
 ) -> tuple[Tensor, Tensor]:
@@ -108,8 +107,7 @@ def occlusion_factors(
         roughness: [n, 1] perceptual roughness in [0, 1].
         environment: [height, width, 3] radiance, equirectangular (z up, centre column along +x).
         n_diffuse_rays, n_specular_rays: The numbers of rays per point.
-        offset: The distance of a ray's start from its point, scene units.
-        along_ray: Whether the start is moved along the ray instead of along the normal.
+        offset: The distance of a ray's start from its point along the normal, scene units.
         seed: The seed of the random shift that each point's lattice of rays gets.
         n_channels: 1 averages the factors over the colour channels, 3 keeps them.
 
@@ -126,7 +124,6 @@ def occlusion_factors(
         n_diffuse_rays,
         n_specular_rays,
         offset,
-        along_ray,
         seed,
     )
     o_d, o_s = o_d.to(positions.device), o_s.to(positions.device)

@@ -80,7 +80,7 @@ class AssetRenderer:
             ValueError: A map, a pose or a size cannot be used.
         """
         fx, fy, cx, cy = (float(value) for value in intrinsics)
-        images = _core.render(
+        return _core.render(
             self._scene,
             **self._surface,
             environment=_float32(environment),
@@ -99,8 +99,6 @@ class AssetRenderer:
             pixel_filter=pixel_filter,
             catcher_height=catcher_height,
         )
-        del images["rays"]
-        return images
 
 
 def _float32(values: np.ndarray) -> np.ndarray:

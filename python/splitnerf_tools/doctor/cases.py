@@ -287,9 +287,7 @@ OWN: dict[str, Callable[[], dict[str, object]]] = {
     "monte_carlo_light": lambda: dict(
         light_dirs=sphere(32)[:16].repeat(N, 1, 1), pdf=pattern(N, 16), radiance=pattern(N, 16, 3)
     ),
-    "occlusion_factors": lambda: dict(
-        positions=0.3 * sphere(N), n_diffuse_rays=64, n_specular_rays=64, offset=0.0125, along_ray=False
-    ),
+    "occlusion_factors": lambda: dict(positions=0.3 * sphere(N), n_diffuse_rays=64, n_specular_rays=64, offset=0.0125),
     "pixel_losses": lambda: dict(
         mean=0.1 * pattern(N, 3),
         opacity=0.5 * pattern(N),
