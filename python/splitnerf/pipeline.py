@@ -63,7 +63,7 @@ from splitnerf.run_folder import (
 )
 from splitnerf.training.batches import without_fine_levels
 from splitnerf.training.checkpoint import check_same_scene, config_of, load_checkpoint, restore_model, restored_grid
-from splitnerf.training.loop import Training
+from splitnerf.training.loop import Training, begun
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.observer import NOBODY, Event, Observer
 from splitnerf.training.schedule import progress_by
@@ -111,8 +111,7 @@ def reconstruct(
         config, dataset, test = load_with_masks(data, run, config, downscale, overwrite)
         config = for_turntable(config) if dataset.light_turns is not None else config
         config = config if resume else without_fine_levels(dataset, config)
-        training = Training(dataset, config, run, torch.device(device), observer)
-        training.begin(resume)
+        training = begun(dataset, config, run, torch.device(device), observer, resume)
         begin_run(run, config, dataset, overwrite)
         training.complete()
         if not training.finished:

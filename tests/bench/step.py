@@ -61,7 +61,7 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(run / "checkpoint.pt", folder)
         training = Training(dataset, config, Path(folder), torch.device("cpu"))
-        training.begin(resume=True)
+        training.restore()
         training.progress_at = lambda step, seconds: LATE
         training.mesh.asked_at = 1.0
 

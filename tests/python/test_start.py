@@ -13,7 +13,7 @@ from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
 from splitnerf.training import loop, start
-from splitnerf.training.loop import Training
+from splitnerf.training.loop import begun
 from splitnerf.training.start import (
     CLEAR_SHARE,
     MARGIN,
@@ -287,8 +287,7 @@ def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
         run.mkdir()
     expected = train_scene(load_dataset(data), tiny(**settings), whole)
     config = tiny(**settings)
-    training = Training(load_dataset(data), config, part, torch.device("cpu"))
-    training.begin()
+    training = begun(load_dataset(data), config, part, torch.device("cpu"))
     assert training.take_step.start is not None
     while training.step < 4:
         training.refresh()
@@ -305,9 +304,6 @@ def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monk
     shape = StartShape(ball(radius, n=16), torch.zeros(16, 16, 16), BOX, is_sure=False)
     monkeypatch.setattr(loop, "start_shape", lambda *_: shape)
     config = tiny(**{"surface.start": "stereo", "steps": 400, "sphere_radius": of_sphere})
-    training = Training(load_dataset(data), config, tmp_path, torch.device("cpu"))
-    before = [x.clone() for x in training.model.parameters()]
-    training.begin()
-    is_kept = all(torch.equal(x, y) for x, y in zip(before, training.model.parameters()))
-    assert (training.take_step.start is shape) == (radius == 0.7) != is_kept
-    assert training.step == 0 and not list(tmp_path.iterdir())
+    training = begun(load_dataset(data), config, tmp_path, torch.device("cpu"))
+    assert (training.take_step.start is shape) == (radius == 0.7)
+    assert training.step == 40 and training.run == tmp_path and not list(tmp_path.iterdir())

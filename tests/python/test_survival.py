@@ -73,7 +73,7 @@ def test_work_that_may_be_left_out_is_so_after_a_request():
     assert done == [1]
 
 
-@pytest.mark.parametrize("part", ["splitnerf.pipeline.load_splits", "splitnerf.training.loop.Training.begin"])
+@pytest.mark.parametrize("part", ["splitnerf.pipeline.load_splits", "splitnerf.pipeline.begun"])
 @pytest.mark.parametrize(("words", "more"), [((), ("--overwrite",)), (("--resume", "auto"), ())])
 def test_an_interruption_before_the_first_checkpoint_says_what_to_do(
     part, words, more, data, tmp_path, monkeypatch, capsys

@@ -8,7 +8,7 @@ from pytest import CaptureFixture
 from splitnerf.cli import BAD_INPUT, main
 from splitnerf.config import Config, preset
 from splitnerf.data.dataset import Dataset
-from splitnerf.training.loop import Training
+from splitnerf.training.loop import Training, begun
 from splitnerf.training.observer import NOBODY, Observer
 
 # A tenth of the default sizes and less; the method is that of the preset.
@@ -51,8 +51,7 @@ def train_scene(
     dataset: Dataset, config: Config, run: Path, observer: Observer = NOBODY, *, device="cpu", resume=False
 ) -> Training:
     """A training after its last step, in the folder `run`."""
-    training = Training(dataset, config, run, torch.device(device), observer)
-    training.begin(resume)
+    training = begun(dataset, config, run, torch.device(device), observer, resume)
     training.complete()
     return training
 

@@ -39,9 +39,9 @@ from splitnerf.training.schedule import (
 from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
-# Steps of a first shape that is not sure, and of a sphere beside it; the run whose schedule they follow; the share of the run's time or
-# steps that they may take; and the decibels by which the shape must be better: one that is wrong leads for some hundred steps.
-STEPS_OF_TRIALS, SCHEDULE_OF_TRIALS, SHARE_OF_TRIALS, CLEARLY = 800, 6000, 0.15, 0.2
+# Steps of a first shape that is not sure, and of a sphere beside it; the share of the run's time or steps that both may take; and the
+# decibels by which the shape must be better: one that is wrong leads for some hundred steps.
+TRIED_STEPS, TRIED_SHARE, CLEARLY = 600, 0.2, 0.2
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -93,44 +93,11 @@ class Training:
         self.seconds, self.n_rays, self.previewed_at, self.log = 0.0, c.constants.initial_rays, 0.0, StepLog(run)
         self.started, self.saved_at = time.monotonic(), 0.0  # a time of the clock, and seconds of the run
 
-    def begin(self, resume: bool = False) -> None:
-        """Goes on from the run's checkpoint, or begins with the shape that stereo finds, near which it is held at first."""
-        c = self.config
-        if resume:
-            self.restore()
-        elif c.surface.start == "stereo":
-            note_once("the photos are compared to find a first shape")
-            with same_bits(c.run.deterministic):
-                shape = start_shape(self.photos, self.grid.hull, c)
-                if shape is not None and (shape.is_sure or self.explains_more(shape)):
-                    self.start_from(shape)
-
     def start_from(self, shape: StartShape) -> None:
         """Begins with a shape, to which the levels of the field that are open at first are fitted."""
         self.model.open_levels(0.0)
         fit_to(self.model.sdf_field, shape, self.generator, self.config)
         self.take_step.start = shape
-
-    def explains_more(self, shape: StartShape) -> bool:
-        """Whether the photos are explained clearly better after some hundred steps from a shape than after as many from a
-        sphere; not where there is no time for them."""
-        c = self.config
-        config = c.replace({"max_minutes": 0.0, "steps": SCHEDULE_OF_TRIALS})
-        n_steps = min(STEPS_OF_TRIALS, int(SHARE_OF_TRIALS * c.run.steps))
-        ends = time.monotonic() + (SHARE_OF_TRIALS * 60.0 * c.training_minutes or math.inf)
-        note_once("the first shape is not clear; some hundred steps from it and from a sphere are compared")
-        found = []
-        with tempfile.TemporaryDirectory() as folder, torch.random.fork_rng():
-            trials = [Training(self.dataset, config, Path(folder), self.model.device) for _ in range(2)]
-            trials[0].start_from(shape)
-            while len(found) < n_steps and time.monotonic() < ends:
-                for trial in trials:
-                    with trial.take_step.running():
-                        trial.refresh()
-                        trial.advance(None)
-                found.append([trial.log.psnr or 0.0 for trial in trials])
-        of_shape, of_sphere = np.mean(found[-max(1, n_steps // 4) :] or [[0.0, 0.0]], axis=0)
-        return len(found) == n_steps and of_shape > of_sphere + CLEARLY
 
     @property
     def progress(self) -> float:
@@ -282,3 +249,48 @@ class Training:
         if self.finished:
             self.grid.update(self.model.sdf_field.sdf, self.model.s_value)
         self.save()
+
+
+def begun(
+    dataset: Dataset, config: Config, run: Path, device: torch.device, observer: Observer = NOBODY, resume: bool = False
+) -> Training:
+    """A training that goes on from the run's checkpoint, or begins with the shape that stereo finds, near which it is held at
+    first. A shape that the photos are not clear about is tried. Arguments as of :class:`Training`."""
+    training, c = Training(dataset, config, run, device, observer), config
+    if resume:
+        training.restore()
+    elif c.surface.start == "stereo":
+        note_once("the photos are compared to find a first shape")
+        with same_bits(c.run.deterministic):
+            shape = start_shape(training.photos, training.grid.hull, c)
+            if shape is not None and shape.is_sure:
+                training.start_from(shape)
+            elif shape is not None:
+                note_once("the first shape is not clear; some hundred steps from it and from a sphere are compared")
+                other = Training(dataset, config, run, device, observer)
+                other.start_from(shape)
+                training = better_of(training, other)
+    return training
+
+
+def better_of(sphere: Training, other: Training) -> Training:
+    """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos clearly
+    better after some hundred steps; also where there is no time for these."""
+    c, run, observer, found = sphere.config, sphere.run, sphere.observer, []
+    n_steps = min(TRIED_STEPS, int(0.5 * TRIED_SHARE * c.run.steps))
+    ends = sphere.started + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
+    other.started = sphere.started
+    with tempfile.TemporaryDirectory() as folder:
+        for each in (sphere, other):  # the run's folder may still hold an earlier run
+            each.observer, each.log.path = NOBODY, Path(folder) / METRICS
+        while len(found) < n_steps and time.monotonic() < ends:
+            for each in (sphere, other):
+                with each.take_step.running():
+                    each.refresh()
+                    each.advance(None)
+            found.append([each.log.psnr or 0.0 for each in (sphere, other)])
+        of_sphere, of_other = np.mean(found[-max(1, n_steps // 4) :] or [[0.0, 0.0]], axis=0)
+        better = other if len(found) == n_steps and of_other > of_sphere + CLEARLY else sphere
+        better.settle()
+    better.observer, better.log.path = observer, run / METRICS
+    return better
