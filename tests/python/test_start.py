@@ -306,4 +306,4 @@ def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monk
     config = tiny(**{"surface.start": "stereo", "steps": 400, "sphere_radius": of_sphere})
     training = begun(load_dataset(data), config, tmp_path, torch.device("cpu"))
     assert (training.take_step.start is shape) == (radius == 0.7)
-    assert training.step == 40 and training.run == tmp_path and not list(tmp_path.iterdir())
+    assert training.step == 50 and training.run == tmp_path and not list(tmp_path.iterdir())

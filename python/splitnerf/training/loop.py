@@ -41,7 +41,7 @@ from splitnerf.training.step import Step, StepNumbers
 
 # Steps of a first shape that is not sure, and of a sphere beside it; the share of the run's time or steps that both may take; and the
 # decibels by which the shape must be better: one that is wrong leads for some hundred steps.
-TRIED_STEPS, TRIED_SHARE, CLEARLY = 600, 0.2, 0.2
+TRIED_STEPS, TRIED_SHARE, CLEARLY = 600, 0.25, 0.2
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -275,10 +275,10 @@ def begun(
 
 def better_of(sphere: Training, other: Training) -> Training:
     """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos clearly
-    better after some hundred steps; also where there is no time for these."""
+    better after some hundred steps; also where there is no time for most of these."""
     c, run, observer, found = sphere.config, sphere.run, sphere.observer, []
     n_steps = min(TRIED_STEPS, int(0.5 * TRIED_SHARE * c.run.steps))
-    ends = sphere.started + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
+    ends = time.monotonic() + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
     other.started = sphere.started
     with tempfile.TemporaryDirectory() as folder:
         for each in (sphere, other):  # the run's folder may still hold an earlier run
@@ -290,7 +290,7 @@ def better_of(sphere: Training, other: Training) -> Training:
                     each.advance(None)
             found.append([each.log.psnr or 0.0 for each in (sphere, other)])
         of_sphere, of_other = np.mean(found[-max(1, n_steps // 4) :] or [[0.0, 0.0]], axis=0)
-        better = other if len(found) == n_steps and of_other > of_sphere + CLEARLY else sphere
+        better = other if len(found) > 0.75 * n_steps and of_other > of_sphere + CLEARLY else sphere
         better.settle()
     better.observer, better.log.path = observer, run / METRICS
     return better
