@@ -266,8 +266,28 @@ def test_parallel_cameras_find_the_object_by_the_masks():
 def test_cameras_at_one_place_are_named(tmp_path):
     root = make_blender(tmp_path)
     edit(root, lambda m: [frame.update(transform_matrix=np.eye(4).tolist()) for frame in m["frames"]])
-    with pytest.raises(InputError, match="all 12 cameras stand at one place, as if nothing had estimated the poses"):
+    with pytest.raises(InputError, match="all 12 cameras stand at one place; estimate poses, or invert them"):
         load_dataset(root)
+
+
+@pytest.mark.parametrize("masked", [True, False])
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [
+        (np.linalg.inv, "all 14 cameras stand at one place; estimate poses, or invert them"),
+        (lambda pose: np.linalg.inv(pose.round(6)), "the cameras look away from what they have in common; poses must be"),
+        (lambda pose: pose @ np.diag([1, -1, -1, 1]), "look away .*, with OpenGL's axes"),
+    ],
+)
+def test_poses_of_another_form_are_named(tmp_path, form, said, masked):
+    """Inverses of poses around the origin are at one place, but for rounding."""
+    root = write_transforms(tmp_path)
+    for i in range(COUNT):
+        edit(root, set_pose(i, lambda pose: form(pose).tolist()), "transforms.json")
+        if not masked:
+            write_image(root / f"images/v{i:02d}.png", np.full((SIZE, SIZE, 3), 0.5))
+    with pytest.raises(InputError, match=said):
+        load_dataset(root, masked=masked)
 
 
 @pytest.mark.parametrize("alpha", ["empty", "moved"])

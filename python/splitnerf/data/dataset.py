@@ -19,7 +19,7 @@ from splitnerf.data.images import area_average, read_image
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
-from splitnerf.data.normalisation import MasksContradict, box_of_views, estimate_box, transform_points
+from splitnerf.data.normalisation import LOOKS_AWAY, MasksContradict, box_of_views, estimate_box, looks_away, transform_points
 from splitnerf.data.photos import CERTAIN, Loader, Photo, separated_mask, silhouette_factor
 from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, memory_for_photos, new_array
 from splitnerf.data.reading import Reading
@@ -424,7 +424,8 @@ def _estimate_box(root: Path, frames: list[Frame], photos: list[Photo], masked: 
     except MasksContradict as error:
         names = [frames[i].image_path.name for i in error.views]
         where = f" (those of {', '.join(names[:5])} and the others)" if names else ""
-        raise _Contradiction(f"{root}: {error}{where}; check the poses and masks") from None
+        cure = LOOKS_AWAY if looks_away(poses) else "check the poses and masks"
+        raise _Contradiction(f"{root}: {error}{where}; {cure}") from None
     except ValueError as error:
         raise InputError(f"{root}: {error}") from None
 

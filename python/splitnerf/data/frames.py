@@ -10,6 +10,7 @@ import numpy as np
 
 from splitnerf.data.layouts import colmap, neus, stanford_orb, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
+from splitnerf.data.normalisation import SAME_PLACE
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
@@ -115,7 +116,7 @@ def split_rule(root: Path, reading: Reading = Reading()) -> str:
 def far_origin(frames: list[Frame]) -> np.ndarray:
     """[3] the middle of the cameras, rounded; 0 where they are at most `FAR` times as far away as apart."""
     middle, extent = _middle_and_extent(frames)
-    if extent == 0 or np.linalg.norm(middle) <= FAR * extent:
+    if not SAME_PLACE * (far := np.linalg.norm(middle)) < extent or far <= FAR * extent:
         return np.zeros(3)
     step = 10.0 ** np.ceil(np.log10(extent))
     return np.round(middle / step) * step + 0.0  # no -0

@@ -16,6 +16,11 @@ IN_VIEW = 0.8  # radius of what all cameras look at, as a share of what the narr
 POOR = 0.9  # median share of the masks that the hull covers, below which masks and poses are not of one object
 SAME_PLACE = 1e-9  # distance of cameras, as a share of that from the origin
 PARALLEL = 1e-4  # mean squared sine below which optical axes do not say where they meet
+AHEAD = 0.5  # mean cosine between the axes and the ways to where they meet, below which poses are of another form
+LOOKS_AWAY = (
+    "the cameras look away from what they have in common; poses must be camera-to-world (not its inverse), with OpenGL's "
+    "axes (-z forward)"
+)
 
 
 class MasksContradict(ValueError):
@@ -70,6 +75,8 @@ def estimate_box(
         low, high = points.min(axis=0), points.max(axis=0)
         centre, half = (low + high) / 2, (high - low) / 2 + cell
     if (share := np.median([view.covered(points, cell) for view in views])) < POOR:
+        if looks_away(poses):
+            raise MasksContradict([])
         found = f"what all masks hold covers {share:.0%} of them"
         note_once(f"masks and poses fit badly: {found}; check masks, poses and lens, `splitnerf inspect` shows them")
     if FITS_RADIUS[0] < np.linalg.norm(points, axis=1).max() <= FITS_RADIUS[1]:
@@ -86,10 +93,12 @@ def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -
         sizes: [n, 2] height and width of the photos in pixels.
 
     Raises:
-        ValueError: All cameras stand at one place.
+        ValueError: All cameras stand at one place, or they look away from what they have in common.
     """
     poses = poses.astype(np.float64)
     _check_places(poses)
+    if looks_away(poses):
+        raise ValueError(LOOKS_AWAY)
     centre = nearest_to_rays(poses[:, :3, 3], poses[:, :3, 2])
     distances = np.linalg.norm(poses[:, :3, 3] - centre, axis=1)
     half = 0.5 * (sizes[:, ::-1] / intrinsics[:, :2]).min(axis=1)  # tangent of half the narrower angle
@@ -107,10 +116,18 @@ def _check_places(poses: np.ndarray) -> None:
     """Raises ValueError where all cameras stand at one place."""
     places = poses[:, :3, 3]
     if np.ptp(places, axis=0).max() <= SAME_PLACE * np.abs(places).max():
-        many = f"all {len(poses)} cameras stand at one place, as if nothing had estimated the poses; estimate them"
+        many = f"all {len(poses)} cameras stand at one place; estimate poses, or invert them if they are world-to-camera"
         raise ValueError(
             many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides"
         )
+
+
+def looks_away(poses: np.ndarray) -> bool:
+    """Whether cameras do not look at what their axes have in common."""
+    places, axes = poses[:, :3, 3], poses[:, :3, 2]
+    back = places - nearest_to_rays(places, axes)
+    cosines = (back * axes).sum(axis=1) / np.maximum(np.linalg.norm(back, axis=1), 1e-300)
+    return bool(spread_of(axes) > PARALLEL and cosines.mean() < AHEAD)
 
 
 def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
