@@ -225,6 +225,9 @@ def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
     Image.new("RGB", (8, 6), "red").save(tmp_path / "a.png.png")
     with pytest.raises(InputError, match="a.png.png: is coloured"):  # before COLMAP has run for minutes
         mask_files(photos, tmp_path)
+    Image.fromarray(np.arange(48, dtype=np.uint16).reshape(6, 8) * 5).save(tmp_path / "a.png.png")  # bytes in 16 bits
+    with pytest.raises(InputError, match="a.png.png: at most 0.4% of white, is black; make it white on the object"):
+        mask_files(photos, tmp_path)
     Image.new("L", (8, 6), 255).save(tmp_path / "a.png.png")
     assert [path.name for path in mask_files(photos, tmp_path).values()] == ["a.png", "a.png.png"]
     Image.new("L", (8, 6)).save(tmp_path / "a.bmp")

@@ -70,6 +70,14 @@ def test_normals_of_shiny_blender_are_whole(scene):
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0]
 
 
+@pytest.mark.parametrize("downscale", [1, 5])
+def test_normals_of_photos_without_alpha_are_scored_on_their_masks(tmp_path, downscale):
+    root = write_transforms(tmp_path, masks=True)
+    write_image(root / "images/v08_normal.png", np.tile(linear_to_srgb(np.float32([0.6, 0.48, 0.64])), (SIZE, SIZE, 1)))
+    data = load_dataset(root, "test", downscale)
+    assert np.array_equal(load_view_truths(data)[1].normal_mask, data.images[1, ..., 3] > 0.9)
+
+
 def test_radiance_a_little_below_0_is_noise(tmp_path):
     pixels = np.random.default_rng(11).uniform(0.1, 0.5, (16, 16, 3)).astype(np.float32)
     pixels[3, 4] = -0.01

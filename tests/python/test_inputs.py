@@ -13,7 +13,7 @@ from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split
 from splitnerf.data.images import read_colours, read_header, read_image, read_radiance, srgb_to_linear, write_image
-from splitnerf.data.layouts import colmap
+from splitnerf.data.layouts import colmap, transforms
 from splitnerf.data.layouts.frame import checked_pose, listed_file, listed_image
 from splitnerf.data.lens import lens_intrinsics, read_lens
 from splitnerf.data.photos import read_mask, separated_mask
@@ -291,6 +291,21 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
     ):
         assert listed_image(tmp_path, listed, Path("t")).samefile(tmp_path / expected)
     assert listed_file(tmp_path, "a\\b.PNG", Path("t")).samefile(tmp_path / "a/b.PNG")
+
+
+def test_a_mask_is_no_photo(tmp_path):
+    """It lies beside the photo, with the photo's name and another suffix, or one more."""
+    make_blender(tmp_path, train=6, test=2)
+    edit(tmp_path, lambda meta: meta["frames"][2].update(file_path="train/a", mask_path="train/a.png"))
+    (tmp_path / "train/r_2.png").rename(tmp_path / "train/a.jpg")
+    write_image(tmp_path / "train/a.png", np.ones((SIZE, SIZE)))
+    assert transforms.read(tmp_path, "train")[2].image_path.name == "a.jpg"
+    (tmp_path / "train/a.jpg").unlink()
+    (tmp_path / "train/a.jpg.png").write_bytes(b"")
+    for name in ("train/a", "train/a.jpg"):
+        edit(tmp_path, lambda meta, name=name: meta["frames"][2].update(file_path=name))
+        with pytest.raises(InputError, match=f"{name}: no such image"):
+            transforms.read(tmp_path, "train")
 
 
 def test_found_masks_have_names_of_their_own():

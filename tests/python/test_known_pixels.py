@@ -54,6 +54,13 @@ def test_masks_of_the_object_are_told_by_their_look(tmp_path, capsys):
     assert f"{tmp_path}: its mask files are taken for the object's, white on 39% of the photos" in said
 
 
+def test_masks_that_are_nowhere_white_are_said(tmp_path, capsys):
+    root = write_transforms(tmp_path, masks=True)
+    write_image(root / "masks/v01.png.png", sphere_alpha(sphere_poses()[1], CENTRE, RADIUS) * np.linspace(0.6, 0.8, SIZE))
+    load_dataset(root)
+    assert "masks that are nowhere white make the object clear (v01.png.png: " in notes(capsys)
+
+
 def test_masks_that_keep_nearly_all_say_what_to_ignore(tmp_path, capsys):
     data, plain = load_dataset(ignoring_scene(tmp_path)), load_dataset(write_transforms(tmp_path / "plain"))
     assert "its mask files are taken to ignore what is black, as they keep" in notes(capsys)

@@ -287,7 +287,7 @@ def test_masks_are_paired_by_names_and_numbers(tmp_path, capsys):
     (neus / "image/._v00.png").write_bytes(b"a Mac's")
     first, second = sorted((neus / "mask").iterdir())[:2]
     first.rename(neus / "mask/zz.png")
-    with pytest.raises(InputError, match="mask: has no mask of v00.png; give each image one of its name or number"):
+    with pytest.raises(InputError, match="mask: has no mask that is of v00.png alone; give each image one of its name"):
         read_frames(neus, "train")
     (neus / "mask/zz.png").rename(neus / "mask/0.png")
     frames, _ = read_frames(neus, "train", Reading("all"))
@@ -296,6 +296,14 @@ def test_masks_are_paired_by_names_and_numbers(tmp_path, capsys):
         path.rename(neus / f"image/{i}.png")
     read_frames(neus, "train")
     assert "in the alphabet's order, which is not that of their numbers" in capsys.readouterr().err
+    for folder, ending in (("image", ".png"), ("mask", ".jpg")):
+        for i, path in enumerate(sorted((neus / folder).glob("[!.]*"))):
+            path.rename(neus / folder / f"{('left', 'right')[i % 2]}_{i // 2}{ending}")
+    frames, _ = read_frames(neus, "train", Reading("all"))
+    assert all(frame.mask_path.stem == frame.name for frame in frames)
+    (neus / "mask/right_3.jpg").rename(neus / "mask/3.png")
+    with pytest.raises(InputError, match="mask: has no mask that is of left_0.png alone"):
+        read_frames(neus, "train")
     (model / "masks").mkdir()
     read_frames(model, "train")
     assert "masks: no image has a mask there (v00.png.png would be one)" in capsys.readouterr().err

@@ -50,6 +50,7 @@ CERTAIN = 0.999  # part of a pixel that must be known
 PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT lies below PEAK; 1 counts as clipped
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
+WHITE = 0.98  # least part of full scale that a mask should have somewhere
 
 MOST_LABELS = 32  # number and size of values up to which a mask of more than two of them may be one of labels
 LABELLED = 0.01  # share of a mask in areas of values between the least and the largest
@@ -106,6 +107,8 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     is_object = (mask_kind if frame.mask_kind == "auto" else frame.mask_kind) == "object"
     if frame.mask_path is not None and is_object:
         alpha = read_mask(frame.mask_path)
+        if 0 < (brightest := float(decoded(alpha.max()))) < WHITE:
+            note_once("masks that are nowhere white make the object clear", f"{frame.mask_path.name}: {brightest:.1%}")
     elif frame.mask_path is not None:
         known = read_mask(frame.mask_path) > 0
     if frame.dynamic_mask_path is not None:

@@ -210,7 +210,11 @@ def _load_view(dataset: Dataset, view: int) -> ViewTruth:
     encoded = read("normal.png", 3)
     if encoded is None:
         return truth
-    alpha = read_image(image_path)[..., -1]
+    photo, mask = read_image(image_path), dataset.cropped(view, dataset.images[view])[..., 3]
+    if photo.shape[2] in (2, 4):
+        alpha = photo[..., -1]
+    else:
+        alpha = np.pad(np.kron(mask, np.ones((factor, factor))), [(0, n % factor) for n in photo.shape[:2]])
     if in_folder or image_path.with_name(f"{image_path.stem}_alpha.png").is_file():
         averaged = average((2 * encoded[..., :3] - 1) * alpha[..., None])
         truth.normal, truth.normal_mask = _unit(averaged, average(alpha) > OPAQUE)

@@ -63,8 +63,8 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
     """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
 
     Raises:
-        InputError: A photo has no mask, one of another size, one that may be another's, too, or one that is no mask, or all
-            are black.
+        InputError: A photo has no mask, one of another size, one that may be another's, too, one that is no mask, or a faint
+            one, or all are black.
     """
     found, stems = {}, {}
     for path in sorted(folder.iterdir()):
@@ -83,8 +83,11 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
         if (width, height) != (photo.width, photo.height):
             raise InputError(f"{path}: is {width}x{height}, its photo {photo.width}x{photo.height}; make them equal")
         found[photo.name] = path
-    if not any([read_mask(path).any() for path in found.values()]):  # each is read, and refused if it is no mask
+    brightest = {path: float(decoded(read_mask(path).max())) for path in found.values()}
+    if not any(brightest.values()):
         raise InputError(f"{folder}: every mask is black; give masks that are white on the object")
+    if faint := [path for path, value in brightest.items() if 0 < value <= 0.5]:
+        raise InputError(f"{faint[0]}: at most {brightest[faint[0]]:.1%} of white, is black; make it white on the object")
     return found
 
 

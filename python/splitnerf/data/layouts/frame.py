@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from unicodedata import normalize
@@ -87,13 +88,15 @@ def listed_file(folder: Path, name: str, source: Path) -> Path:
     return path
 
 
-def listed_image(folder: Path, name: str, source: Path) -> Path:
-    """The image that `source` lists relative to `folder`, perhaps without its suffix or with one in other letters. Raises InputError
-    where there is no such regular file."""
+def listed_image(folder: Path, name: str, source: Path, others: Sequence[Path | None] = ()) -> Path:
+    """The image that `source` lists relative to `folder`, perhaps without its suffix or with one in other letters; none of `others`,
+    unless that is its name. Raises InputError where there is no such regular file."""
     stem, own = os.path.splitext(name)
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
-    for candidate in (name, *(name + suffix for suffix in suffixes), stem + own.lower(), stem + own.upper()):
-        if any(is_file(folder / form) for form in forms(candidate)):
+    longer = [] if own.lower() in suffixes else [name + suffix for suffix in suffixes]
+    for candidate in (name, *longer, stem + own.lower(), stem + own.upper()):
+        paths = [folder / form for form in forms(candidate)]
+        if any(is_file(path) and (candidate == name or path not in others) for path in paths):
             return listed_file(folder, candidate, source)
     raise InputError(
         f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "

@@ -45,9 +45,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
             raise InputError(
                 f"{root / folder}: has {len(found)} images, {CAMERAS} has {len(matrices)} cameras; repair it"
             )
-    of_key = {_key(mask): mask for mask in masks}
-    if alone := [image.name for image in images if masks and _key(image) not in of_key]:
-        raise InputError(f"{root / MASKS}: has no mask of {alone[0]}; give each image one of its name or number")
+    mask_of = _paired(images, masks, root / MASKS) if masks else {}
     numbers = [_key(image) for image in images if re.search(r"\d", image.stem)]
     if numbers != sorted(numbers):
         note_once(
@@ -64,7 +62,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
                 image,
                 checked_pose(pose, name),
                 read_lens(numbers, name)[0],
-                mask_path=of_key.get(_key(image)),
+                mask_path=mask_of.get(image),
                 mask_kind="object",
             )
         )
@@ -114,6 +112,20 @@ def _pictures(folder: Path) -> list[Path]:
         path
         for path in folder.glob("*")
         if path.suffix.lower() in LDR_SUFFIXES and path.is_file() and not path.name.startswith("._")
+    )
+
+
+def _paired(images: list[Path], masks: list[Path], folder: Path) -> dict[Path, Path]:
+    """The mask of each of as many images: of its name, or else its stem, or else its numbers. Raises InputError where all three leave
+    it open for one."""
+    for key in (lambda path: path.name, lambda path: path.stem, _key):
+        of_key, keys = {key(mask): mask for mask in masks}, list(map(key, images))
+        if of_key.keys() == {*keys} and len(of_key) == len(images):
+            return {image: of_key[key] for image, key in zip(images, keys)}
+    masks_keys = list(map(_key, masks))
+    open_one = next(path for path, key in zip(images, keys) if (keys.count(key), masks_keys.count(key)) != (1, 1))
+    raise InputError(
+        f"{folder}: has no mask that is of {open_one.name} alone; give each image one of its name or number"
     )
 
 

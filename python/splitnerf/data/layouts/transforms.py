@@ -186,11 +186,12 @@ def read_entries(path: Path) -> tuple[dict, list[dict]]:
 
 def read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     """Frame `index` of a transforms file; its image is relative to the file's folder."""
-    image_path = listed_image(path.parent, str(need(entry, "file_path", path, f" in frame {index}")), path)
-    mask_path, behind_path = (
-        None if entry.get(key) is None else listed_file(path.parent, str(entry[key]), path)
+    others = mask_path, behind_path = [
+        listed_file(path.parent, str(entry[key]), path) if entry.get(key) else None
         for key in ("mask_path", "behind_path")
-    )
+    ]
+    name = str(need(entry, "file_path", path, f" in frame {index}"))
+    image_path = listed_image(path.parent, name, path, others)
     dynamic = image_path.with_name(f"dynamic_mask_{image_path.stem}.png")
     pose, lens, distortion = _read_camera(entry, meta, index, path, f"frame {index} ({image_path.name})")
     mask_kind = entry.get("mask_kind", meta.get("mask_kind", "auto"))
