@@ -187,6 +187,10 @@ def test_a_radiance_file_may_begin_at_any_corner(tmp_path, order):
 def test_grey_photos_of_sixteen_bits_keep_their_values(tmp_path):
     png(np.full((4, 4), 30000, np.uint16)).save(tmp_path / "x.png")
     assert (read_upright(tmp_path / "x.png") == 30000).all()
+    png(np.full((4, 4), 0.5, np.float32)).save(tmp_path / "f.tif")
+    with pytest.raises(InputError, match="f.tif: holds floats, whose white is unknown; save it in 8 or 16 bits"):
+        read_upright(tmp_path / "f.tif")
+    (tmp_path / "f.tif").unlink()
     (tmp_path / "._x.png").write_bytes(b"a Mac's")
     assert len(find_photographs(tmp_path)) == 1
 

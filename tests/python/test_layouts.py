@@ -14,7 +14,7 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import write_json
-from splitnerf.data.layouts import transforms
+from splitnerf.data.layouts import colmap, transforms
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -69,6 +69,30 @@ def test_masks_of_colmap_are_found_by_both_names(tmp_path):
         (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/v{i:02d}.png")
     frames, _ = read_frames(root, "train")
     assert all(frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.name) for frame in frames)
+
+
+@pytest.mark.parametrize("folder", ["absolute", "../images", "cam"])
+def test_masks_of_colmap_are_found_from_paths(tmp_path, capsys, folder):
+    """With a byte order mark in the model, and names that have blanks."""
+    root = write_colmap(tmp_path, binary=False, masks=True)
+    (model,) = root.rglob("images.txt")
+    listed = root.resolve() / "images" if folder == "absolute" else folder
+    model.write_text("\ufeff" + model.read_text().replace(" v", f" {listed}/a v"))
+    (root / "images/cam").mkdir()
+    for i in range(COUNT):
+        name = f"cam/a v{i:02d}.png" if folder == "cam" else f"a v{i:02d}.png"
+        (root / f"images/v{i:02d}.png").rename(root / "images" / name)
+        (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/a v{i:02d}.png")
+    masks = [frame.mask_path for frame in colmap.read(root)]
+    said = "masks: no image has a mask there (cam/a v00.png.png would be one)" in capsys.readouterr().err
+    if folder == "cam":
+        assert masks == [None] * COUNT and said
+    else:
+        assert masks == [root / f"masks/a v{i:02d}.png" for i in range(COUNT)] and not said
+    lines = model.read_text().splitlines()
+    model.write_text("\n".join(lines[:1] + lines[1::2]).replace("a v", "an y v"))  # three words more
+    with pytest.raises(InputError, match="images.txt: is damaged or no file of COLMAP .image '.*an "):
+        colmap.read(root)
 
 
 def test_masks_of_colmap_are_found_by_other_forms_of_their_names(tmp_path):

@@ -104,6 +104,8 @@ def read_upright(path: Path) -> np.ndarray:
         if image.has_transparency_data:
             note_once(f"{path.parent}: the alpha of photos is not used; give --masks if it is the object's", path.name)
         upright = image if turn is None else image.transpose(turn)
+        if upright.mode == "F":
+            raise InputError(f"{path}: holds floats, whose white is unknown; save it in 8 or 16 bits")
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
             pixels = np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
         else:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import struct
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,22 +60,27 @@ def read(root: Path, split: None = None) -> list[Frame]:
             lenses[camera] = read_lens(cameras[camera], f"{cameras_file}: camera {camera}")
         image = listed_image(root / IMAGES, name, source)
         pose = checked_pose(_camera_to_world(motion), f"{source}: the pose of {name!r}")
-        masks = [root / MASKS / form for form in forms(name)]
+        masks = [root / MASKS / form for given in (name, _inside(image, root)) for form in forms(given)]
         candidates = (path for mask in masks for path in (mask.with_name(f"{mask.name}.png"), mask.with_suffix(".png")))
-        mask = next((path for path in candidates if is_file(path)), None)
+        mask = next((path for path in candidates if is_file(path) and not path.samefile(image)), None)
         frames.append(Frame(os.path.splitext(name)[0], image, pose, *lenses[camera], mask))
     if not frames:
         raise InputError(f"{source}: has no registered image; give another model")
     used = [frame.mask_path for frame in frames if frame.mask_path is not None]
     if len({*used}) < len(used):
         double = next(frame for frame in frames if frame.mask_path and used.count(frame.mask_path) > 1)
-        whole = f"{double.image_path.name}.png"
+        whole = f"{_inside(double.image_path, root)}.png"
         raise InputError(
             f"{double.mask_path}: may be the mask of several images; call masks by whole names, as {whole}"
         )
     if not used and (root / MASKS).is_dir():
-        note_once(f"{root / MASKS}: no image has a mask there", f"{frames[0].image_path.name}.png would be one")
+        note_once(f"{root / MASKS}: no image has a mask there", f"{_inside(frames[0].image_path, root)}.png would be one")
     return frames
+
+
+def _inside(image: Path, root: Path) -> str:
+    """The path of an image from the folder of images, however the model writes it."""
+    return os.path.relpath(image, root / IMAGES)
 
 
 def _model_files(root: Path) -> tuple[Path, Path] | None:
@@ -121,7 +127,8 @@ def _images(file: BinaryIO) -> Iterator[Image]:
         lines = _lines(file)
         for line in filter(str.strip, lines):
             _, *motion, camera, name = line.split(maxsplit=9)
-            if len(next(lines, "").split()) % 3:  # x, y and the number of each point
+            points = next(lines, "").split()  # x, y and the number of each
+            if len(points) % 3 or (points and not points[-1].lstrip("-").isdigit()):
                 raise ValueError(f"image {name.strip()!r} has no line of points, which may be empty")
             yield name.strip(), int(camera), tuple(map(float, motion))
         return
@@ -165,6 +172,8 @@ def _take(file: BinaryIO, form: str) -> tuple:
 
 def _lines(file: BinaryIO) -> Iterator[str]:
     """The lines of a text file but its comments."""
+    if file.read(len(BOM_UTF8)) != BOM_UTF8:
+        file.seek(0)
     return (os.fsdecode(line.rstrip(b"\r\n")) for line in file if not line.startswith(b"#"))
 
 
