@@ -19,6 +19,11 @@ def escaped(text: str, kept: str = "") -> str:
     return "".join(c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
 
 
+def shown(value: object) -> str:
+    """A value of a file, in a message: shortened, and text as such."""
+    return f"{'the text ' * isinstance(value, str)}{value!r}"[:50]
+
+
 class InputError(Exception):
     """Bad input or usage: one clear line that names the file and says what to do.
 

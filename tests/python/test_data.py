@@ -365,6 +365,11 @@ def test_a_frame_may_have_a_lens_of_its_own(tmp_path):
     assert by_name["v05"].lens["camera_angle_x"] == 0.7 and "fl_x" not in by_name["v05"].lens
 
 
+@pytest.mark.parametrize("value", [True, False, 1, 0])
+def test_a_number_says_that_a_lens_is_a_fisheye(value):
+    assert read_lens({"fl_x": 9, "k1": 0.1, "is_fisheye": value}, "x")[1].fisheye == value
+
+
 def test_zeros_bend_nothing(tmp_path):
     zeros = dict.fromkeys(("k1", "k2", "k3", "k4", "p1", "p2"), 0.0)
     plain = load_dataset(write_transforms(tmp_path / "a", masks=True))

@@ -222,6 +222,7 @@ LISTS = [
     ({"train_filenames": [0, 3], "test_filenames": [1]}, {0, 3}, {1}),
     ({"train_filenames": [0, 1, 3], "val_filenames": [1]}, {0, 3}, {1}),
     ({"train_filenames": [0, 1, 3]}, {0, 1, 3}, None),
+    ({"train_filenames": [0, 1], "test_filenames": [0, 1]}, {0, 1}, {0, 1}),
 ]
 
 
@@ -252,7 +253,15 @@ def test_images_of_other_files_and_names_without_a_frame_are_said(tmp_path, caps
     (tmp_path / "transforms_test.json").write_text(json.dumps(content))
     assert len(load_dataset(tmp_path).frame_names) == 6
     assert "the scores of test views are those of photos trained on" in capsys.readouterr().err
+    (tmp_path / "transforms_test.json").write_text(json.dumps(content | {"frames": []}))
+    assert len(load_dataset(tmp_path)) == 5 and len(load_dataset(tmp_path, "test")) == 1  # every 8th
+    (tmp_path / "transforms.json").rename(tmp_path / "transforms_train.json")
+    assert not has_test_split(tmp_path) and len(load_dataset(tmp_path)) == 6
+    (tmp_path / "transforms_train.json").rename(tmp_path / "transforms.json")
     (tmp_path / "transforms_test.json").unlink()
+    write_image(tmp_path / "masks/a.png", np.ones((4, 4)))
+    assert transforms.read(tmp_path, None)[1].mask_path is None
+    assert "masks: no frame has a mask there; 'mask_path' of a frame would name it" in capsys.readouterr().err
     lists = {"test_filenames": ["train\\r_1.png", "train/r_9.png"]}
     (tmp_path / "transforms.json").write_text(json.dumps(content | lists))
     assert "r_1" not in load_dataset(tmp_path).frame_names
@@ -301,9 +310,11 @@ def test_a_mask_is_no_photo(tmp_path):
     """It lies beside the photo, with the photo's name and another suffix, or one more."""
     make_blender(tmp_path, train=6, test=2)
     edit(tmp_path, lambda meta: meta["frames"][2].update(file_path="train/a", mask_path="train/a.png"))
+    edit(tmp_path, lambda meta: meta["frames"][3].update(mask_path="", behind_path=""))
     (tmp_path / "train/r_2.png").rename(tmp_path / "train/a.jpg")
     write_image(tmp_path / "train/a.png", np.ones((SIZE, SIZE)))
-    assert transforms.read(tmp_path, "train")[2].image_path.name == "a.jpg"
+    frames = transforms.read(tmp_path, "train")
+    assert frames[2].image_path.name == "a.jpg" and frames[3].mask_path is frames[3].behind_path is None
     (tmp_path / "train/a.jpg").unlink()
     (tmp_path / "train/a.jpg.png").write_bytes(b"")
     for name in ("train/a", "train/a.jpg"):

@@ -56,7 +56,9 @@ def test_masks_of_the_object_are_told_by_their_look(tmp_path, capsys):
 
 def test_masks_that_are_nowhere_white_are_said(tmp_path, capsys):
     root = write_transforms(tmp_path, masks=True)
-    write_image(root / "masks/v01.png.png", sphere_alpha(sphere_poses()[1], CENTRE, RADIUS) * np.linspace(0.6, 0.8, SIZE))
+    write_image(
+        root / "masks/v01.png.png", sphere_alpha(sphere_poses()[1], CENTRE, RADIUS) * np.linspace(0.6, 0.8, SIZE)
+    )
     load_dataset(root)
     assert "masks that are nowhere white make the object clear (v01.png.png: " in notes(capsys)
 
@@ -282,7 +284,10 @@ def test_cameras_at_one_place_are_named(tmp_path):
     ("form", "said"),
     [
         (np.linalg.inv, "all 14 cameras stand at one place; estimate poses, or invert them"),
-        (lambda pose: np.linalg.inv(pose.round(6)), "the cameras look away from what they have in common; poses must be"),
+        (
+            lambda pose: np.linalg.inv(pose.round(6)),
+            "the cameras look away from what they have in common; poses must be",
+        ),
         (lambda pose: pose @ np.diag([1, -1, -1, 1]), "look away .*, with OpenGL's axes"),
     ],
 )

@@ -19,7 +19,14 @@ from splitnerf.data.images import area_average, read_image
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
-from splitnerf.data.normalisation import LOOKS_AWAY, MasksContradict, box_of_views, estimate_box, looks_away, transform_points
+from splitnerf.data.normalisation import (
+    LOOKS_AWAY,
+    MasksContradict,
+    box_of_views,
+    estimate_box,
+    looks_away,
+    transform_points,
+)
 from splitnerf.data.photos import CERTAIN, Loader, Photo, separated_mask, silhouette_factor
 from splitnerf.data.pixels import Photos, averaged_codes, forget_pages, memory_for_photos, new_array
 from splitnerf.data.reading import Reading

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from splitnerf.errors import InputError, note_once
+from splitnerf.errors import InputError, note_once, shown
 
 SMALLEST, LARGEST = 1e-6, 1e9  # bounds of a pinhole's numbers
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4"), ("p1", "p2")
@@ -99,7 +99,7 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
         InputError: A number is out of bounds, the focal length is missing, or the camera model is not one of `MODELS`.
     """
     numbers = {key: value for key, value in numbers.items() if value is not None}
-    usual = "OPENCV_FISHEYE" if numbers.pop("is_fisheye", False) is True else "OPENCV"
+    usual = "OPENCV_FISHEYE" if numbers.pop("is_fisheye", False) == 1 else "OPENCV"
     model = numbers.pop("camera_model", usual)
     if not isinstance(model, str) or model not in MODELS:
         raise InputError(
@@ -109,7 +109,7 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
     coefficients = {key: numbers.pop(key, 0.0) for key in RADIAL + TANGENTIAL}
     for key, value in coefficients.items():
         if not isinstance(value, (int, float)) or not abs(value) <= LARGEST_COEFFICIENT:
-            raise InputError(f"{where}: '{key}' is no coefficient of a lens: {str(value)[:40]}; repair it")
+            raise InputError(f"{where}: '{key}' is no coefficient of a lens: {shown(value)}; repair it")
     if not numbers.keys() & {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"}:
         raise InputError(f"{where}: missing key 'camera_angle_x' (or 'fl_x'); add it")
     for key, value in numbers.items():
@@ -117,7 +117,8 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
         valid = isinstance(value, (int, float)) and (-LARGEST if placed else SMALLEST) <= value <= LARGEST
         if not valid or (key.startswith("camera_angle") and value >= np.pi):
             kind = "number" if placed else "positive number"
-            raise InputError(f"{where}: '{key}' must be a {kind}, got {str(value)[:40]}; repair it")
+            kind += " of radians below pi" if key.startswith("camera_angle") else ""
+            raise InputError(f"{where}: '{key}' must be a {kind}, got {shown(value)}; repair it")
     fisheye = "FISHEYE" in model
     radial, tangential = (tuple(float(coefficients[key]) for key in keys) for keys in (RADIAL, TANGENTIAL))
     if fisheye and any(tangential):

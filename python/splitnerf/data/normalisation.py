@@ -116,7 +116,9 @@ def _check_places(poses: np.ndarray) -> None:
     """Raises ValueError where all cameras stand at one place."""
     places = poses[:, :3, 3]
     if np.ptp(places, axis=0).max() <= SAME_PLACE * np.abs(places).max():
-        many = f"all {len(poses)} cameras stand at one place; estimate poses, or invert them if they are world-to-camera"
+        many = (
+            f"all {len(poses)} cameras stand at one place; estimate poses, or invert them if they are world-to-camera"
+        )
         raise ValueError(
             many if len(poses) > 1 else "one view does not show the object's shape; add views from other sides"
         )

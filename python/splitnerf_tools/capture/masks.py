@@ -87,7 +87,9 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
     if not any(brightest.values()):
         raise InputError(f"{folder}: every mask is black; give masks that are white on the object")
     if faint := [path for path, value in brightest.items() if 0 < value <= 0.5]:
-        raise InputError(f"{faint[0]}: at most {brightest[faint[0]]:.1%} of white, is black; make it white on the object")
+        raise InputError(
+            f"{faint[0]}: at most {brightest[faint[0]]:.1%} of white, is black; make it white on the object"
+        )
     return found
 
 

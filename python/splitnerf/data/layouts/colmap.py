@@ -74,7 +74,9 @@ def read(root: Path, split: None = None) -> list[Frame]:
             f"{double.mask_path}: may be the mask of several images; call masks by whole names, as {whole}"
         )
     if not used and (root / MASKS).is_dir():
-        note_once(f"{root / MASKS}: no image has a mask there", f"{_inside(frames[0].image_path, root)}.png would be one")
+        note_once(
+            f"{root / MASKS}: no image has a mask there", f"{_inside(frames[0].image_path, root)}.png would be one"
+        )
     return frames
 
 

@@ -33,7 +33,7 @@ from splitnerf.data.json_files import need, read_json
 from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
-from splitnerf.errors import InputError, note_once
+from splitnerf.errors import InputError, note_once, shown
 from splitnerf.files import is_file
 
 SINGLE = "transforms.json"
@@ -67,8 +67,8 @@ def present(root: Path) -> bool:
 
 def splits(root: Path) -> list[str] | None:
     """The splits that have a file of their own or a list in the single file; None for a single file without lists."""
-    if any((root / _own(split)).is_file() for split in SPLITS):
-        return [split for split in SPLITS if (root / _own(split)).is_file()]
+    if own := _own_splits(root):
+        return own
     meta, _ = read_entries(root / SINGLE)
     return [split for split in SPLITS if split == "train" or _held_out(meta)] if _has_lists(meta) else None
 
@@ -77,7 +77,7 @@ def read(root: Path, split: str | None) -> list[Frame]:
     """The frames of a split, or all, in the order of the files. Raises InputError where a file is missing or unusable,
     or a frame has no image, no usable pose or no lens."""
     if split is None:
-        own = [root / _own(name) for name in SPLITS if (root / _own(name)).is_file()]
+        own = [root / _own(name) for name in _own_splits(root)]
         frames: dict[Path, Frame] = {}
         for path in own or [root / SINGLE]:
             for frame in _frames(path, None):
@@ -86,7 +86,7 @@ def read(root: Path, split: str | None) -> list[Frame]:
     own = root / _own(split)
     if not own.is_file() and not (root / SINGLE).is_file():
         raise InputError(f"{root}: has neither {own.name} nor {SINGLE}; add posed images for the {split} split")
-    if not own.is_file():
+    if split not in _own_splits(root) and (root / SINGLE).is_file():
         return _frames(root / SINGLE, split, _of_other_files(root, split))
     return _frames(own, split if split == "train" else None, _of_other_files(root, split))
 
@@ -100,6 +100,12 @@ def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
 
 def _own(split: str) -> str:
     return f"transforms_{split}.json"
+
+
+def _own_splits(root: Path) -> list[str]:
+    """The splits with a file of their own; one for testing without frames holds nothing out."""
+    found = [split for split in SPLITS if (root / _own(split)).is_file()]
+    return [split for split in found if split == "train" or read_json(root / _own(split), "frames").get("frames") != []]
 
 
 def _has_lists(meta: dict) -> bool:
@@ -138,11 +144,11 @@ def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
         return _held_out(meta).__contains__
     chosen = _listed(meta, "train_filenames")
     others = set().union(*(_listed(meta, key) for key in SPLITS["test"]))
+    rest = chosen - others
     if chosen & others:
-        note_once(
-            "images that transforms.json lists for training and for testing are for testing", sorted(chosen & others)[0]
-        )
-    return lambda name: name not in others and (not chosen or name in chosen)
+        what = "for testing" if rest else "for both: the scores of test views are those of photos trained on"
+        note_once(f"images that transforms.json lists for training and for testing are {what}", min(chosen & others))
+    return (rest or chosen).__contains__ if chosen else lambda name: name not in others
 
 
 def _frames(path: Path, split: str | None, held_out: Set[str] = frozenset()) -> list[Frame]:
@@ -163,6 +169,8 @@ def _frames(path: Path, split: str | None, held_out: Set[str] = frozenset()) -> 
     frames = [read_frame(entries[i], meta, i, path) for i in kept]
     if not frames:
         raise InputError(f"{path}: has no frames for the {split} split; add posed images")
+    if any((path.parent / "masks").glob("*.png")) and not any(frame.mask_path for frame in frames):
+        note_once(f"{path.parent / 'masks'}: no frame has a mask there; 'mask_path' of a frame would name it")
     return frames
 
 
@@ -232,7 +240,7 @@ def _read_exposure(entry: dict, index: int, path: Path) -> float:
     exposure = entry.get("exposure", 1.0)
     if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
         raise InputError(
-            f"{path}: 'exposure' of frame {index} must be a positive number, got {str(exposure)[:40]}; repair it"
+            f"{path}: 'exposure' of frame {index} must be a positive number, got {shown(exposure)}; repair it"
         )
     return float(exposure)
 
@@ -240,7 +248,7 @@ def _read_exposure(entry: dict, index: int, path: Path) -> float:
 def _read_gamma(gamma: object, path: Path) -> float:
     if not isinstance(gamma, (int, float)) or not (gamma == 0 or 1 <= gamma <= LARGEST_GAMMA):
         raise InputError(
-            f"{path}: 'gamma' must be 0 (sRGB's curve) or a number from 1 to {LARGEST_GAMMA:g}, got {str(gamma)[:40]}; repair it"
+            f"{path}: 'gamma' must be 0 (sRGB's curve) or a number from 1 to {LARGEST_GAMMA:g}, got {shown(gamma)}; repair it"
         )
     return float(gamma)
 
