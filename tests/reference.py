@@ -7,7 +7,6 @@ Tests compare the operators with these functions, and benchmarks time both. Each
 import math
 
 import torch
-from splitnerf.ops.rays import CELL_OCCUPIED, CELL_OPAQUE
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -67,26 +66,6 @@ def sdf_field(
 
 
 # ---- rays ----
-
-
-def march_rays(rays_o, rays_d, jitter, cells, box, step, max_samples) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Rays, starts, ends and offsets: makes every point of the lattice along a ray and keeps the occupied ones."""
-    inverse = 1 / torch.where(rays_d == 0, 1e-12, rays_d)
-    a, b = (-box - rays_o) * inverse, (box - rays_o) * inverse
-    near, far = torch.minimum(a, b).amax(1).clamp(min=0), torch.maximum(a, b).amin(1)
-    k = torch.arange(int(2 * math.sqrt(3) * box / step) + 2)
-    starts = near[:, None] + (k + jitter[:, None] - 1) * step
-    middles = starts + 0.5 * step
-    n = len(cells)
-    points = rays_o[:, None] + rays_d[:, None] * middles[..., None]
-    x, y, z = ((points + box) * (n / (2 * box))).long().clamp(0, n - 1).unbind(-1)
-    inside = (middles > near[:, None]) & (middles < far[:, None])
-    state = torch.where(inside, cells[x, y, z], 0)
-    taken = (state == CELL_OCCUPIED) & ((state == CELL_OPAQUE).cumsum(1) == 0)
-    taken = taken & (taken.cumsum(1) <= max_samples)
-    rays, which = taken.nonzero(as_tuple=True)
-    offsets = F.pad(taken.sum(1).cumsum(0), (1, 0))
-    return rays, starts[rays, which], starts[rays, which] + step, offsets
 
 
 def ray_indices(offsets: Tensor) -> Tensor:

@@ -10,7 +10,7 @@ from mesh_shapes import grid_mesh, scene_of
 from op_checks import generator, unit
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops import MeshScene, split_sum_shade
+from splitnerf.ops import MeshScene
 from splitnerf.ops.shading import SHADED, monte_carlo_light, shade_sums
 from splitnerf.ops.visibility import IncomingLight, TexturedSurface, incoming_light
 from splitnerf.render.path_traced import AssetRenderer
@@ -104,38 +104,6 @@ def mean_and_error(samples: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 # ---- the light that is found ----
-
-
-@pytest.mark.parametrize("lamp", [False, True])
-@pytest.mark.parametrize("metallic", [0.0, 1.0])
-@pytest.mark.parametrize("roughness", [0.1, 0.4, 0.8])
-def test_in_a_furnace_a_convex_body_reflects_its_albedo(roughness, metallic, lamp):
-    """Light 1 from everywhere; the directions are drawn as if there were a lamp, or not."""
-    ball, n, face = trimesh.creation.icosphere(2), 400, 37
-    normal, centre = (
-        torch.tensor(np.asarray(x[face]), dtype=torch.float32) for x in (ball.face_normals, ball.triangles_center)
-    )
-    side = unit(torch.linalg.cross(normal, torch.tensor([1.0, 0.0, 0.0])))
-    for n_dot_v in (0.95, 0.3):
-        points = {
-            "positions": centre,
-            "geometric_normals": normal,
-            "normals": normal,
-            "view_dirs": n_dot_v * normal + math.sqrt(1 - n_dot_v**2) * side,
-            "albedo": torch.tensor([0.2, 0.5, 1.0]),
-            "roughness": torch.tensor([roughness]),
-            "metallic": torch.tensor([metallic]),
-        }
-        points = {name: x.repeat(n, 1) for name, x in points.items()}
-        sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
-        light = incoming_light(plain_surface(ball), sky, **points, n_directions=64, seed=3)
-        assert torch.equal(light.visible > 0, (light.directions @ normal > 0) & (light.pdf > 0))
-        mean, error = mean_and_error(reflected(light, light.visible[..., None].expand(-1, -1, 3), points))
-        one = torch.ones(1, 3)
-        x = {name: points[name][:1] for name in SHADED[:5]}
-        albedo = split_sum_shade(**x, specular=one, diffuse=one, compensate=True)[0].double()
-        assert (error < 0.01 * albedo).all()
-        assert ((mean - albedo).abs() < SIGMAS * error + 3e-3 * albedo).all(), (mean, albedo, error)
 
 
 def seen_from_close(asset: Asset, environment: np.ndarray, bounces: int, n_points: int = 12) -> list[tuple]:

@@ -342,8 +342,11 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     length = ((found.t_ends.double() - start) - step).abs() / slack - 1
     backwards = torch.zeros_like(start)
     backwards[1:] = torch.where(ray[1:] == ray[:-1], step - slack[1:] - (start[1:] - start[:-1]), -1.0)
+    place = (point + box) * (side / (2 * box))
+    within = ((place - place.round()).abs() > side * slack[:, None]).all(1)  # no rounding leads to the next cell
+    empty = within & (cells[place.long().clamp(0, side - 1).unbind(1)] == 0)
     worst = torch.full((n,), -1.0, dtype=torch.float64)
-    violation = torch.stack([outside, length, backwards]).amax(0) + 0 * start
+    violation = torch.stack([outside, length, backwards, empty.double()]).amax(0) + 0 * start
     worst = worst.scatter_reduce(0, ray, violation, "amax")
     counts = found.offsets.diff()
     return torch.where(counts > limit, 1.0, worst), rows
