@@ -176,10 +176,6 @@ def test_what_cannot_be_is_said_in_one_line(settings, message):
     "settings",
     [
         {"constants.box": 2},
-        {"light.resolution": 16},
-        {"run.cuda_graphs": True},
-        {"run.deterministic": True},
-        {"run.max_minutes": 1.0},
         {"run.cuda_graphs": True, "shading.method": "split", "occlusion.kind": "off"},
         {
             "shading.method": "split",

@@ -122,9 +122,8 @@ def test_the_grid_of_a_gpu_waits_for_no_count(monkeypatch):
         assert torch.equal((grid.values.abs() <= bound).view_as(grid.cells), grid.cells == CELL_OCCUPIED)
 
 
-@pytest.mark.parametrize("device", ["cpu", "cuda"])
-def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
-    """Where each part costs the host its launches; the CPU takes parts that stay in its caches."""
+def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch):
+    """Where each part costs the host its launches; the CPU takes parts that stay in its caches, see test_visibility_parts.py."""
     parts, shade = [], model.split_sum_shade
     monkeypatch.setattr(model, "SHADED_CHUNK", model.SHADED_CHUNK | {"cpu": 50})
     monkeypatch.setattr(
@@ -132,14 +131,14 @@ def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch, device):
     )
     torch.manual_seed(0)
     with pretend_gpu(monkeypatch):
-        scene = SceneModel(tiny(open_below=0.0)).to(device)
+        scene = SceneModel(tiny(open_below=0.0)).to("cuda")
         scene.sdf_field.grid.table.data.normal_(0.0, 0.3)
         scene.sdf_field.hidden_direction.data[:, 3:].normal_(0.0, 0.05)  # dents, that rays from the surface hit
         SurfaceMesh(scene).request(0.1)
         n = len(scene.bits.emitters.vertices)
         parts.clear()
         scene.refresh_indirect(scene.evaluate_light())
-    assert n > 100 and parts == ([n] if device == "cuda" else [50] * (n // 50) + [n % 50] * (n % 50 > 0))
+    assert n > 100 and parts == [n]
 
 
 @pytest.mark.parametrize(("name", "pads"), [("fast", True), ("paper", False)])

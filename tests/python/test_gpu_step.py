@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 import torch
 from op_checks import DEVICES
-from pretend_gpu import pretend_gpu
 from pretend_graphs import graphs_on_the_cpu
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, load_dataset
@@ -210,29 +209,18 @@ def truth(side) -> tuple[Work, SameDraws, Answer, Answer]:
     raise RuntimeError(f"other samples are shaded in each of {BATCHES} batches")
 
 
-@contextmanager
-def on_device(name: str, monkeypatch) -> Iterator[str]:
-    """The device to train on; "pretended" is one of tensors that only say so."""
-    if name != "pretended":
-        yield name
-        return
-    with pretend_gpu(monkeypatch):
-        yield "cuda"
-
-
-@pytest.mark.parametrize("device", ["pretended", *DEVICES])
-def test_a_step_agrees_with_float64(side, truth, monkeypatch, device):
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_step_agrees_with_float64(side, truth, device):
     work, draws, true, on_cpu = truth
-    with on_device(device, monkeypatch) as name:
-        there = side.restored(name)
-        found = answer(there, work, draws)
-        assert not beyond(true, on_cpu, found) and torch.equal(found.shaded, on_cpu.shaded)
-        offsets = there.take_step.find(on(there.model.device, work.batch), PROGRESS).packed.offsets.diff().cpu()
-        others = offsets != work.found.packed.offsets.diff()[: len(offsets)]
-        assert others.double().mean() <= OTHER_RAYS
-        if device == "cuda":
-            assert not beyond(true, on_cpu, answer(there, work, draws, tf32=True), TF32)
-        assert there.model.sums_light and there.model.bits and not there.model.is_unoccluded  # all caches were read
+    there = side.restored(device)
+    found = answer(there, work, draws)
+    assert not beyond(true, on_cpu, found) and torch.equal(found.shaded, on_cpu.shaded)
+    offsets = there.take_step.find(on(there.model.device, work.batch), PROGRESS).packed.offsets.diff().cpu()
+    others = offsets != work.found.packed.offsets.diff()[: len(offsets)]
+    assert others.double().mean() <= OTHER_RAYS
+    if device == "cuda":
+        assert not beyond(true, on_cpu, answer(there, work, draws, tf32=True), TF32)
+    assert there.model.sums_light and there.model.bits and not there.model.is_unoccluded  # all caches were read
     terms = {"colour", "neutral", "light_prior", "entropy", "gradient of variance", "gradient of light.texels, level 2"}
     assert terms < true.numbers.keys() and true.numbers["colour"] != on_cpu.numbers["colour"]  # it was in float64
 

@@ -16,13 +16,11 @@ from splitnerf.pipeline import check_repeatable, load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
 from splitnerf.training import loop, meshes, metrics
-from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.finite import Diverged
 from splitnerf.training.gpu_step import GpuStep
 from splitnerf.training.metrics import StepLog
 from splitnerf.training.schedule import next_ray_count, progress_by
 from splitnerf.training.step import Capacity, StepNumbers
-from test_train import flat, same
 from tiny_runs import lines_of, tiny, train_scene
 
 PLAIN = {"occlusion.kind": "off", "shading.method": "split", "preview_every": 2.0}  # nothing is traced, nothing shown
@@ -264,34 +262,6 @@ def test_a_finished_run_that_is_resumed_or_loaded_stays_as_it_is(data, tmp_path)
         assert model.sdf_field.grid.n_active == 2 and torch.equal(model.sdf_field.sdf(x), first.sdf_field.sdf(x))
         for name in ("vertices", "bits"):
             assert torch.equal(getattr(model.bits.cache, name), getattr(first.bits.cache, name))
-
-
-def test_all_that_is_saved_comes_back(data, tmp_path, monkeypatch):
-    """In a run of another seed; of a mesh that is lit, and of numbers that no other run has. The rates are those of the
-    settings."""
-    dataset, config = (
-        load_dataset(data),
-        tiny(steps=8, mesh_every=2.0, preview_every=2.0, open_below=0.0, levels_open_by=0.0),
-    )
-    finished = calls(monkeypatch, loop.Training, "finish", lambda self: self)
-    train_scene(dataset, config, tmp_path)
-    one, other = finished[0], loop.Training(dataset, config.replace({"seed": 8}), tmp_path, torch.device("cpu"))
-    one.step, one.seconds, one.n_rays, one.previewed_at = 5, 12.5, 77, 0.125
-    one.mesh.environment, one.mesh.made_at = torch.rand(32, 64, 3), 0.375
-    cached = one.model.bits.state()
-    other_light = {name: torch.rand_like(cached[name]) for name in ("sky", "sent") if cached[name] is not None}
-    one.model.bits.restore(cached | other_light)
-    one.save()
-    kept = load_checkpoint(tmp_path / "checkpoint.pt")
-    torch.manual_seed(9)
-    other.restore()
-    assert other.step > 0
-    other.save()
-    again, before = flat(load_checkpoint(tmp_path / "checkpoint.pt")), flat(kept)
-    assert again.keys() == before.keys()
-    different = [key for key in before if not same(again[key], before[key])]
-    assert [key for key in different if not key.startswith("optimiser.param_groups")] == ["config.run.seed"]
-    assert kept["occlusion_light"]["sky"].std() > 0.2 and kept["meshed_at"] == 0.375 and kept["n_rays"] == 77
 
 
 @pytest.mark.parametrize("deterministic", [False, True])

@@ -11,7 +11,6 @@ from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
 from splitnerf.training import losses
-from splitnerf.training import schedule as optimiser_module
 from splitnerf.training import step as step_module
 from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.schedule import (
@@ -75,28 +74,6 @@ def test_each_part_has_its_rate_and_its_decay(light, sparse):
         own = {"variance": (0.001, 0.0), "light.texels": (0.02, 0.0)}.get(name, (0.01, 0.01))
         assert (rates[id(parameter)], decays[id(parameter)]) == own, name
         assert sparsely[id(parameter)] == (sparse and name == "sdf_field.grid.table"), name
-
-
-@pytest.mark.parametrize("dtype", ["float32", "float16"])
-@pytest.mark.parametrize("sparse", [False, True])
-def test_sparse_steps_leave_entries_without_a_gradient_alone(monkeypatch, sparse, dtype):
-    """A step moves the one entry that has a gradient; others decay, lr wd of themselves, but not with sparse steps. What is read
-    of a table of 16 bits is that of the table as it stands after the step."""
-    monkeypatch.setattr(optimiser_module, "WEIGHT_DECAY", 0.5)
-    config = tiny(sparse_steps=sparse, table_dtype=dtype)
-    model = SceneModel(config)
-    grid = model.sdf_field.grid
-    with torch.no_grad():
-        grid.table.fill_(0.25)
-    grid.stored()
-    grid.table.grad = torch.zeros_like(grid.table)
-    grid.table.grad[3] = 1.0
-    make_optimiser(model, config).step()
-    assert grid.table[3].tolist() == pytest.approx([0.25 * (1 - 0.005) - 0.01] * 2, rel=1e-5)
-    others = torch.cat([grid.table[:3], grid.table[4:]])
-    torch.testing.assert_close(others, torch.full_like(others, 0.25 if sparse else 0.25 * (1 - 0.005)))
-    if dtype == "float16":
-        assert torch.equal(grid.stored(), grid.table.detach().half())
 
 
 # ---- levels, annealing ----
