@@ -26,7 +26,7 @@ from splitnerf.data.frames import has_test_split, split_rule
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.data.reading import SEPARATED, Reading, is_separated
-from splitnerf.data.truth import read_mesh
+from splitnerf.data.truth import check_truth, read_mesh
 from splitnerf.devices import same_bits
 from splitnerf.errors import InputError, note, note_once
 from splitnerf.evaluate.scoring import Evaluated, Protocol, choose_views, score_asset, score_fields
@@ -79,6 +79,7 @@ def load_splits(
     are refused if `masked`. Raises InputError where the data cannot be used."""
     test = load_dataset(data, "test", downscale, reading, masked=masked) if has_test_split(data, reading) else None
     train = load_dataset(data, "train", downscale, reading, masked=masked)
+    check_truth(test or train)
     held_out = "no view is" if test is None else f"{len(test)} are"
     note_once(f"{data}: {len(train)} views to train on, {held_out} held out for testing ({split_rule(data, reading)})")
     if train.origin.any():

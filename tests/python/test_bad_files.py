@@ -27,6 +27,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import encode_png, read_image, write_image
 from splitnerf.data.truth import load_view_truths, read_mesh
 from splitnerf.errors import InputError
+from splitnerf.pipeline import load_splits
 
 ENDLESS = 10**400
 DOWN = np.arange(SIZE)
@@ -316,7 +317,18 @@ MESHES = {
     "text": (file("a.ply", b"no mesh"), "a.ply: cannot be read as a mesh"),
     "none": (lambda root: root / "b.ply", "no such mesh"),
 }
-TRUTH = {"another size": (picture("test/r_0_albedo.png", 8, 8, 4), "r_0_albedo.png: is 8x8, not the size of r_0.png")}
+TRUTH = {
+    "another size": (picture("test/r_0_normal.png", 8, 8, 3), "r_0_normal.png: is 8x8, not the size of r_0.png"),
+    "no alpha": (
+        picture("test/r_0_albedo.png", SIZE, SIZE, 3),
+        "r_0_albedo.png: needs 4 channels, has 3; re-export it",
+    ),
+}
+POINTS_ALONE = trimesh.PointCloud(np.eye(3)).export(file_type="ply")
+AT_THE_START = {
+    "points": (file("mesh.ply", POINTS_ALONE), "mesh.ply: degenerate or empty mesh; replace or rem"),
+    **TRUTH,
+}
 
 
 # ---- glTF ----
@@ -453,6 +465,7 @@ FORMS = {  # what writes a good folder, what reads it or the path that the damag
     "map": (Path.exists, of_file(read_environment), MAPS),
     "mesh": (Path.exists, of_file(read_mesh), MESHES),
     "truth": (make_blender, lambda root, _: load_view_truths(load_dataset(root, "test")), TRUTH),
+    "truth of a run": (make_blender, lambda root, _: load_splits(root, 1), AT_THE_START),
     "glTF": (lambda root: triangle().write(root / "a.glb"), of_file(read_asset), GLTF),
 }
 

@@ -26,12 +26,13 @@ import trimesh
 from splitnerf.data.asset import unit
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.environment import read_environment
-from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, srgb_to_linear
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_header, read_image, srgb_to_linear
 from splitnerf.data.layouts import view_folders
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.errors import InputError
 
 OPAQUE = 0.9
+MAPS = {"albedo.png": 4, "orm.png": 4, "normal.exr": 4, "normal.png": 3}  # and how many channels each needs
 PREFIX = "relight_"
 PROTOCOLS = {"low": (8, 20), "high": (7, 20)}
 """Maps and test views of the published protocols: low-frequency probes (NeRFactor's), and high-frequency maps."""
@@ -90,7 +91,7 @@ def read_mesh(path: str | os.PathLike) -> trimesh.Trimesh:
         raise InputError(f"{path}: cannot be read as a mesh ({error}); replace it") from None
     filled = isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) > 0
     if not filled or not np.isfinite(mesh.vertices).all() or not mesh.area > 0:
-        raise InputError(f"{path}: degenerate or empty mesh; replace it")
+        raise InputError(f"{path}: degenerate or empty mesh; replace or remove it")
     return mesh
 
 
@@ -98,6 +99,15 @@ def load_view_truths(dataset: Dataset) -> list[ViewTruth]:
     """Loads the truth maps of every view of a split, downscaled like its images. Raises InputError where a map exists
     but is unreadable, has too few channels or another size than its image."""
     return [_load_view(dataset, view) for view in range(len(dataset))]
+
+
+def check_truth(dataset: Dataset) -> None:
+    """Raises InputError where a file of the truth of a split cannot be used, as far as the headers of maps tell."""
+    load_scene_truth(dataset.root)
+    for view, image_path in enumerate(dataset.image_paths):
+        for ending, channels in MAPS.items():
+            if (path := _map_path(image_path, ending)).is_file():
+                _check_map(dataset, view, path, read_header(path)[:3], channels)
 
 
 def decode_clipped_normals(encoded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,14 +127,25 @@ def read_map(dataset: Dataset, view: int, path: Path, channels: int) -> np.ndarr
     if not path.is_file():
         return None
     pixels = read_image(path)
-    if pixels.shape[2] < channels:
-        raise InputError(f"{path}: needs {channels} channels, has {pixels.shape[2]}; re-export it")
-    if (pixels.shape[0] // dataset.downscale, pixels.shape[1] // dataset.downscale) != tuple(dataset.sizes[view]):
-        found = f"{pixels.shape[1]}x{pixels.shape[0]}"
-        raise InputError(f"{path}: is {found}, not the size of {dataset.image_paths[view].name}; re-export it")
+    _check_map(dataset, view, path, pixels.shape, channels)
     if not np.isfinite(pixels).all():
         raise InputError(f"{path}: has NaN or infinite pixels; re-export it")
     return pixels
+
+
+def _map_path(image_path: Path, ending: str) -> Path:
+    """Where a map of the view of `image_path` lies."""
+    return image_path.with_name(ending if image_path.name == view_folders.PHOTO else f"{image_path.stem}_{ending}")
+
+
+def _check_map(dataset: Dataset, view: int, path: Path, shape: tuple[int, ...], channels: int) -> None:
+    """Raises InputError where a map of `shape` has too few channels, or another size than its view's image."""
+    height, width, found = shape
+    if found < channels:
+        raise InputError(f"{path}: needs {channels} channels, has {found}; re-export it")
+    if (height // dataset.downscale, width // dataset.downscale) != tuple(dataset.sizes[view]):
+        of = dataset.image_paths[view].name
+        raise InputError(f"{path}: is {width}x{height}, not the size of {of}; re-export it")
 
 
 def relit_path(image_path: Path, name: str) -> Path:
@@ -182,32 +203,31 @@ def _load_view(dataset: Dataset, view: int) -> ViewTruth:
     in_folder = image_path.name == view_folders.PHOTO
     truth = ViewTruth(image_path.parent.name if in_folder else image_path.stem)
 
-    def read(ending: str, channels: int) -> np.ndarray | None:
-        path = image_path.with_name(ending if in_folder else f"{image_path.stem}_{ending}")
-        return read_map(dataset, view, path, channels)
+    def read(ending: str) -> np.ndarray | None:
+        return read_map(dataset, view, _map_path(image_path, ending), MAPS[ending])
 
     def average(pixels: np.ndarray) -> np.ndarray:
         return dataset.padded(area_average(pixels, factor))
 
-    albedo = read("albedo.png", 4)
+    albedo = read("albedo.png")
     if albedo is not None and in_folder:
         averaged = average(np.concatenate([albedo[..., :3] * albedo[..., 3:4], albedo[..., 3:4]], axis=-1))
         truth.albedo = averaged[..., :3] / np.maximum(averaged[..., 3:], 1e-8)
     elif albedo is not None:
         truth.albedo = dataset.padded(srgb_to_linear(decoded(averaged_codes(albedo, factor))[..., :3]))
 
-    orm = read("orm.png", 4)
+    orm = read("orm.png")
     if orm is not None:
         alpha = average(orm[..., 3])
         averaged = average(orm[..., 1:3] * orm[..., 3:]) / np.maximum(alpha, 1e-8)[..., None]
         truth.roughness, truth.metallic = averaged[..., 0], averaged[..., 1]
 
-    exact = read("normal.exr", 4)
+    exact = read("normal.exr")
     if exact is not None:
         averaged = average(exact)
         truth.normal, truth.normal_mask = _unit(averaged[..., :3], averaged[..., 3] > OPAQUE)
         return truth
-    encoded = read("normal.png", 3)
+    encoded = read("normal.png")
     if encoded is None:
         return truth
     photo, mask = read_image(image_path), dataset.cropped(view, dataset.images[view])[..., 3]
