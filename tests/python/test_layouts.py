@@ -91,7 +91,7 @@ def test_masks_of_colmap_are_found_from_paths(tmp_path, capsys, folder):
         assert masks == [root / f"masks/a v{i:02d}.png" for i in range(COUNT)] and not said
     lines = model.read_text().splitlines()
     model.write_text("\n".join(lines[:1] + lines[1::2]).replace("a v", "an y v"))  # three words more
-    with pytest.raises(InputError, match="images.txt: is damaged or no file of COLMAP .image '.*an "):
+    with pytest.raises(InputError, match="images.txt: is damaged or no file of COLMAP .image '"):
         colmap.read(root)
 
 
