@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
+from pkgutil import resolve_name
 from typing import Any, Protocol
 
 TITLES = ("data", "reconstruction", "results", "many runs", "this installation")  # of `splitnerf --help`, in order
@@ -49,4 +49,4 @@ def installed() -> Plugin:
     """What the tools add; nothing where they are not installed."""
     if find_spec("splitnerf_tools") is None:
         return Plugin()
-    return import_module("splitnerf_tools.plugin").PLUGIN
+    return resolve_name("splitnerf_tools.plugin:PLUGIN")
