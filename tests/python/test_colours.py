@@ -173,6 +173,8 @@ def test_primaries_of_an_exr_are_brought_to_srgb(tmp_path, capsys):
         paths.append(write_exr(tmp_path / f"{name}.exr", np.tile(light, (4, 4, 1)), primaries=primaries))
     assert read_radiance(paths[0])[1, 1].tolist() == light.tolist() and not capsys.readouterr().err
     assert read_radiance(paths[1])[1, 1] == pytest.approx(FROM_P3 @ light, abs=2e-3)
+    green = write_exr(tmp_path / "green.exr", np.tile(np.float32([0, 1, 0]), (4, 4, 1)), primaries=DISPLAY_P3)
+    assert read_radiance(green)[1, 1] == pytest.approx(np.maximum(FROM_P3[:, 1], 0), abs=2e-3)  # outside of sRGB
     assert "primaries that are not sRGB's; they are brought to sRGB's (p3.exr)" in capsys.readouterr().err
 
 

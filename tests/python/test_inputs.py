@@ -389,9 +389,9 @@ def test_keys_that_are_not_used_are_named(tmp_path, capsys):
 def test_a_background_that_is_not_used_is_named(tmp_path, capsys):
     """Photos that their alpha has cut out show none; a file that is not there, or of another shape, is refused."""
     make_blender(tmp_path, train=6, test=2)
-    edit(tmp_path, lambda meta: meta["frames"][2].update(behind_path="train/r_3.png"))
+    edit(tmp_path, lambda meta: meta["frames"][2].update(behind_path="train/r_2.png"))
     paths = load_dataset(tmp_path).behind_paths
-    assert paths == [None] * 2 + [tmp_path / "train/r_3.png"] + [None] * 3
+    assert paths == [None] * 2 + [tmp_path / "train/r_2.png"] + [None] * 3
     assert "'behind_path' is not used" in capsys.readouterr().err
     write_image(tmp_path / "wide.png", np.zeros((8, 32, 4), np.float32))
     for name, told in (("none.png", "no such image"), ("wide.png", "must be RGBA and of its photo's shape")):

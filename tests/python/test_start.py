@@ -114,7 +114,7 @@ def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
     monkeypatch.setattr(start, "grey_photos", sized)
     monkeypatch.setattr(start, "FINE_PASSES", start.FINE_PASSES[-1:])
     monkeypatch.setattr(start, "FULL_FINE", 0.7)  # this box has thick walls
-    monkeypatch.setattr(start, "TRIED_FOLLOWED", 0.6)  # one pass of three leaves the surface beside its place
+    monkeypatch.setattr(start, "FOLLOWED_TRIED", 0.6)  # one pass of three leaves the surface beside its place
     shape = start.start_shape(SimpleNamespace(height=300, width=size), hull(), preset("cpu"))
     if size < 200:
         assert shape is None

@@ -101,16 +101,16 @@ def to_srgb(codes: np.ndarray, path: Path) -> np.ndarray:
 
 
 def from_primaries(light: np.ndarray, primaries: tuple[float, ...], path: Path) -> np.ndarray:
-    """Linear colours [..., 3] in given primaries in those of Rec. 709, with a note; as they are where that is no difference, or the
-    primaries are none."""
-    matrix = _to_rec709(primaries, path)
+    """Linear colours [..., 3] in given primaries in those of Rec. 709, 0 where that is negative, with a note; as they are where that is
+    no difference, or the primaries are none."""
+    matrix = _matrix_of(primaries, path)
     if matrix is None:
         return light
     note_once(f"{path.parent}: images state primaries that are not sRGB's; they are brought to sRGB's", path.name)
-    return light @ matrix.T.astype(light.dtype)
+    return np.maximum(light @ matrix.T.astype(light.dtype), 0)
 
 
-def _to_rec709(primaries: tuple[float, ...], path: Path) -> np.ndarray | None:
+def _matrix_of(primaries: tuple[float, ...], path: Path) -> np.ndarray | None:
     """:func:`to_rec709` of primaries that a file states; None where they are Rec. 709's or, with a note, none."""
     if np.abs(np.subtract(primaries, REC709)).max() <= ALIKE:
         return None
@@ -125,7 +125,7 @@ def _to_rec709(primaries: tuple[float, ...], path: Path) -> np.ndarray | None:
 def from_space(codes: np.ndarray, gamma: float, primaries: tuple[float, ...], path: Path) -> np.ndarray:
     """Colours whose light is a power of the values (of gamma 0: by sRGB's curve) in given primaries, as sRGB; as they are where
     that is about what sRGB is."""
-    matrix = _to_rec709(primaries, path) if codes.shape[2] == 3 else None
+    matrix = _matrix_of(primaries, path) if codes.shape[2] == 3 else None
     if matrix is None and (gamma == 0 or 2.0 < gamma < 2.4):
         return codes
     most = np.iinfo(codes.dtype).max

@@ -116,7 +116,8 @@ def split_rule(root: Path, reading: Reading = Reading()) -> str:
 def far_origin(frames: list[Frame]) -> np.ndarray:
     """[3] the middle of the cameras, rounded; 0 where they are at most `FAR` times as far away as apart."""
     middle, extent = _middle_and_extent(frames)
-    if not SAME_PLACE * (far := np.linalg.norm(middle)) < extent or far <= FAR * extent:
+    far = np.linalg.norm(middle)
+    if extent <= SAME_PLACE * far or far <= FAR * extent:
         return np.zeros(3)
     step = 10.0 ** np.ceil(np.log10(extent))
     return np.round(middle / step) * step + 0.0  # no -0

@@ -333,10 +333,14 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         raise InputError(f"{name}: cannot be read as an image ({_reason(oiio)}); replace it")
     if source.format_name() == "jpeg" and str(source.spec().format) != "uint8":  # Ultra HDR: the gain map was applied
         source.close()
+        data = path.read_bytes()
+        plain = data.replace(b"hdrgm:", b"other:").replace(b"iso:ts:21496", b"iso:ts:other")
+        if plain == data:
+            raise InputError(f"{name}: is a JPEG of a kind that is not known; save it as a PNG")
         note_once(f"{path.parent}: the gain maps of photos are not used", path.name)
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "image"
-            copy.write_bytes(path.read_bytes().replace(b"hdrgm:", b"other:").replace(b"iso:ts:21496", b"iso:ts:other"))
+            copy.write_bytes(plain)
             with _opened(copy, name) as opened:
                 yield opened
         return

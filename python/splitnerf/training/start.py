@@ -37,11 +37,11 @@ POINTS = 384  # such points in each step
 ALIKE = 0.5  # correlation from which a depth is trusted whole
 MARGIN = 0.2  # of correlations, by which a clear depth stands out
 # Of the object's pixels that must be clear; finer windows are clear by chance, too. A shape of fewer clear pixels is tried.
-CLEAR_SHARE, CLEAR_SHARE_FINE, TRIED_SHARE = 0.25, 0.4, 0.15
+CLEAR_SHARE, CLEAR_SHARE_FINE, CLEAR_SHARE_TRIED = 0.25, 0.4, 0.15
 FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing, and a sphere does as well or better
 # Part of the free windows' mean correlation that those which follow the result must have: measured 0.97 to 1.06, of metal bowls and mugs
 # 0.83 to 0.89, of boombox 0.81 to 0.84. A shape of less is tried.
-FOLLOWED, TRIED_FOLLOWED = 0.95, 0.8
+FOLLOWED, FOLLOWED_TRIED = 0.95, 0.8
 FOLLOWING = 0.06, 0.0125  # reach and step of the depths next to the result
 GUESSED = 0.01  # weight of a depth that no correlation supports
 FIRST_TRUNCATION, FIRST_BLUR = 0.12, 1.0  # of the depths that are compared first, scene units and cells
@@ -143,7 +143,7 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
         if is_sure := clear_share(margins, FINE_PROBES, FINE_EDGE) > CLEAR_SHARE_FINE:
             first, most, probes, passes, full = FINE_EDGE, FINE_VIEWS, FINE_PROBES, FINE_PASSES, FULL_FINE
             free, (depths, scores, _) = of_fine, depth_maps(photos_of(first), hull, box, most)
-    if not is_sure and clear < TRIED_SHARE:
+    if not is_sure and clear < CLEAR_SHARE_TRIED:
         return None
     weights = torch.where((depths > 0) & (scores > 0), scores, 0.0)
     spread = photos_of(first).spread(most)
@@ -161,7 +161,7 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
             solid = blurred(solid, blur)
         base = surface_depths(solid, box, photos_of(first))
         alike = followed(photos_of(first), base, free, probes)
-        if alike < TRIED_FOLLOWED:
+        if alike < FOLLOWED_TRIED:
             return None
         return StartShape(exact_distances(solid, box), trust, box, is_sure and alike >= FOLLOWED)
     except EmptyMesh:

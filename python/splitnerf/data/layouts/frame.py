@@ -10,7 +10,7 @@ from unicodedata import normalize
 
 import numpy as np
 
-from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
+from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES, read_header
 from splitnerf.data.lens import Distortion
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import is_file
@@ -89,15 +89,18 @@ def listed_file(folder: Path, name: str, source: Path) -> Path:
 
 
 def listed_image(folder: Path, name: str, source: Path, others: Sequence[Path | None] = ()) -> Path:
-    """The image that `source` lists relative to `folder`, perhaps without its suffix or with one in other letters; none of `others`,
-    unless that is its name. Raises InputError where there is no such regular file."""
+    """The image that `source` lists relative to `folder`, perhaps without its suffix or with one in other letters; one of `others`, its
+    mask, only by its name or where there is no further one and it has an alpha. Raises InputError where there is no such regular file."""
     stem, own = os.path.splitext(name)
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
     longer = [] if own.lower() in suffixes else [name + suffix for suffix in suffixes]
-    for candidate in (name, *longer, stem + own.lower(), stem + own.upper()):
-        paths = [folder / form for form in forms(candidate)]
-        if any(is_file(path) and (candidate == name or path not in others) for path in paths):
-            return listed_file(folder, candidate, source)
+    candidates = (name, *longer, stem + own.lower(), stem + own.upper())
+    found = [
+        (candidate, path) for candidate in candidates for form in forms(candidate) if is_file(path := folder / form)
+    ]
+    found.sort(key=lambda pair: pair[0] != name and pair[1] in others)
+    if found and (found[0][0] == name or found[0][1] not in others or read_header(found[0][1]).channels in (2, 4)):
+        return listed_file(folder, found[0][0], source)
     raise InputError(
         f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "
         "frame"
