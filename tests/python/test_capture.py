@@ -40,6 +40,7 @@ from splitnerf_tools.capture.poses import (
     _alike,
     _are_possible,
     _counted,
+    _focal_lengths,
     _is_doubtful,
     _is_sound,
     _taken_out,
@@ -243,12 +244,17 @@ def test_photos_without_detail_are_told_of(tmp_path, capsys):
     assert "photos: the photos show too little detail; put the object on a pattern" in error
 
 
-def test_a_camera_that_nearly_no_points_hold_is_none():
-    """The others keep theirs, with the lens in OpenCV's model."""
+def one_camera_of_900_pixels() -> pycolmap.SyntheticDatasetOptions:
+    """Of 8 photos."""
     options = pycolmap.SyntheticDatasetOptions()
     options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = 1, 1, 8
     options.camera_model_id, options.camera_params = pycolmap.CameraModelId.RADIAL, [900, 512, 384, 0.05, 0.01]
-    model = pycolmap.synthesize_dataset(options)
+    return options
+
+
+def test_a_camera_that_nearly_no_points_hold_is_none():
+    """The others keep theirs, with the lens in OpenCV's model."""
+    model = pycolmap.synthesize_dataset(one_camera_of_900_pixels())
     weak = model.images[model.reg_image_ids()[3]]
     for index in weak.get_observation_point2D_idxs()[LEAST_SEEN - 1 :]:
         model.delete_observation(weak.image_id, int(index))
@@ -267,8 +273,16 @@ def test_cameras_are_possible_or_not(aspect, focal, possible):
     assert _are_possible(model) == possible
 
 
+def test_a_photo_shows_its_focal_length_through_another_lens():
+    model = pycolmap.synthesize_dataset(one_camera_of_900_pixels())
+    model.cameras[1].focal_length = 1260
+    found = _focal_lengths(model)
+    assert len(found) == 8 and np.allclose([*found.values()], 900, rtol=1e-4)
+    assert model.cameras[1].focal_length == 1260  # the lens that was given stays
+
+
 def test_focal_lengths_of_one_lens():
-    assert _alike({1: 400.0, 2: 560.0, 3: 410.0, 4: 555.0, 5: 404.0}) == {1: 1, 5: 1, 3: 1, 4: 4, 2: 4}
+    assert _alike({1: 400.0, 2: 560.0, 3: 410.0, 4: 555.0, 5: 404.0}) == {1: 1, 5: 1, 3: 1, 4: 2, 2: 2}
 
 
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])

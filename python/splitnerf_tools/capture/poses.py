@@ -51,6 +51,7 @@ OF_A_LENS = 20  # observations by which a further lens must be worth it
 # Pixels of reprojection and share of the photos without a camera from which on all cameras are doubted.
 SURE, LOST = 0.4, 0.05
 TRIES = 2  # to find better ones
+GROUPINGS = 4  # of photos by lenses, at most, until the focal lengths that their points show agree with them
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
 
 
@@ -209,8 +210,8 @@ def _best_model(
     report: Callable[[float], None],
 ) -> pycolmap.Reconstruction | None:
     """The largest model with the lenses of a database, adjusted. Where its cameras are doubtful, also one with pixels that need
-    not be square, one with a lens for each photo, and then one for those of about one focal length: photos may be squeezed,
-    zoomed or cut without a word in their files. The model that explains most is taken; further lenses must be worth it.
+    not be square, one with a lens for each photo, and then with a lens for those of about one focal length, until the focal
+    lengths that their points show agree with it: photos may be squeezed, zoomed or cut without a word in their files. The model that explains most is taken; further lenses must be worth it.
     """
     with closing(pycolmap.Database.open(database)) as base:
         n = base.num_images()
@@ -229,20 +230,20 @@ def _best_model(
     for turn in range(TRIES):
         if best is not None and not _is_doubtful(best, n) and (turn or _are_possible(best)):
             break
-        found = [best, mapped(_with_lenses(database, lenses, "OPENCV", {}))]
-        each = mapped(_with_lenses(database, lenses, "RADIAL", {photo: photo for photo in range(n + 1)}))
-        if each is not None:
-            focal = {key: each.image(key).camera.focal_length_x for key in each.reg_image_ids()}
-            found += [each, mapped(_with_lenses(database, lenses, "RADIAL", _alike(focal), focal))]
+        found = [best, mapped(_with_lenses(database, lenses, "OPENCV", {}, {}))]
+        lens_of, focal = {photo: photo for photo in range(n + 1)}, {}
+        for _ in range(GROUPINGS):
+            found.append(mapped(_with_lenses(database, lenses, "RADIAL", lens_of, focal)))
+            focal |= _focal_lengths(found[-1])
+            if lens_of == (lens_of := _alike(focal)):
+                break
         best = max(found, key=explained)
         options.random_seed = options.mapper.random_seed = options.random_seed + 1
     lenses.unlink(missing_ok=True)
     return best
 
 
-def _with_lenses(
-    database: Path, target: Path, model: str, lens_of: dict[int, int], focal: dict[int, float] | None = None
-) -> Path:
+def _with_lenses(database: Path, target: Path, model: str, lens_of: dict[int, int], focal: dict[int, float]) -> Path:
     """A copy of a database with a camera for the photos of one size and one lens by `lens_of`, with focal lengths to begin
     with. Photos go by COLMAP's numbers."""
     shutil.copy(database, target)
@@ -252,7 +253,7 @@ def _with_lenses(
             key = image.camera_id, lens_of.get(image.image_id)
             if key not in made:
                 camera = before[image.camera_id]
-                length = (focal or {}).get(image.image_id, camera.focal_length_x)
+                length = focal.get(image.image_id, camera.focal_length_x)
                 camera = pycolmap.Camera.create_from_model_name(0, model, length, camera.width, camera.height)
                 camera.camera_id, rig = base.write_camera(camera), pycolmap.Rig()
                 rig.add_ref_sensor(camera.sensor_id)
@@ -264,13 +265,27 @@ def _with_lenses(
     return target
 
 
+def _focal_lengths(model: pycolmap.Reconstruction | None) -> dict[int, float]:
+    """The focal length of each placed photo by the points that it shows, whatever lens it was given."""
+    found, options = {}, pycolmap.AbsolutePoseRefinementOptions(refine_focal_length=True)
+    for image in map(model.image, model.reg_image_ids()) if model else ():
+        seen = [image.points2D[index] for index in image.get_observation_point2D_idxs()]
+        lens = pycolmap.Camera(image.camera.todict())
+        places, points = [point.xy for point in seen], [model.points3D[point.point3D_id].xyz for point in seen]
+        pycolmap.refine_absolute_pose(image.cam_from_world(), places, points, [True] * len(seen), lens, options)
+        found[image.image_id] = lens.focal_length_x
+    return found
+
+
 def _alike(focal: dict[int, float]) -> dict[int, int]:
     """For each photo the first one of those whose focal lengths lie together, by at most ONE_LENS from one to the next."""
-    photos, first = sorted(focal, key=focal.get), {}
-    for before, photo in zip([None, *photos], photos):
-        near = before is not None and focal[photo] < (1 + ONE_LENS) * focal[before]
-        first[photo] = first[before] if near else photo
-    return first
+    groups = []
+    for photo in sorted(focal, key=focal.get):
+        if groups and focal[photo] < (1 + ONE_LENS) * focal[groups[-1][-1]]:
+            groups[-1].append(photo)
+        else:
+            groups.append([photo])
+    return {photo: min(group) for group in groups for photo in group}
 
 
 def _is_doubtful(model: pycolmap.Reconstruction, n: int) -> bool:
