@@ -211,7 +211,8 @@ def _best_model(
 ) -> pycolmap.Reconstruction | None:
     """The largest model with the lenses of a database, adjusted. Where its cameras are doubtful, also one with pixels that need
     not be square, one with a lens for each photo, and then with a lens for those of about one focal length, until the focal
-    lengths that their points show agree with it: photos may be squeezed, zoomed or cut without a word in their files. The model that explains most is taken; further lenses must be worth it.
+    lengths that their points show agree with it: photos may be squeezed, zoomed or cut without a word in their files. The
+    model that explains most is taken; further lenses must be worth it.
     """
     with closing(pycolmap.Database.open(database)) as base:
         n = base.num_images()
