@@ -263,6 +263,21 @@ def test_a_camera_that_nearly_no_points_hold_is_none():
     assert np.allclose([astuple(lens) for lens in found.lenses], [1024, 768, 900, 900, 512, 384, 0.05, 0.01, 0, 0])
 
 
+def test_cameras_that_hold_each_other_go_together():
+    """A first photo shares 14 points with each of two others, which show no more: without them it shows none."""
+    options = one_camera_of_900_pixels()
+    options.num_frames_per_rig = 3
+    model = pycolmap.synthesize_dataset(options)
+    first, *others = sorted(model.reg_image_ids())
+    for i, point in enumerate(sorted(model.points3D)):
+        kept = {first, others[i % 2]} if i < 2 * (LEAST_SEEN - 1) else set()
+        for element in list(model.points3D[point].track.elements):
+            if element.image_id not in kept and point in model.points3D:
+                model.delete_observation(element.image_id, element.point2D_idx)
+    assert [model.images[key].num_points3D for key in (first, *others)] == [28, 14, 14]
+    assert _adjusted(model).num_reg_images() == 0
+
+
 @pytest.mark.parametrize("aspect, focal, possible", [(1.0, 300, True), (0.75, 300, False), (1.0, 60, False)])
 def test_cameras_are_possible_or_not(aspect, focal, possible):
     model = pycolmap.synthesize_dataset(pycolmap.SyntheticDatasetOptions())

@@ -339,10 +339,12 @@ def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
                 refined.delete_point3D(key)
         if all(_is_central(refined.cameras[key]) for key in often):
             break
-    for image in map(refined.image, list(refined.reg_image_ids())):
-        alone = image.camera_id not in often
-        if image.num_points3D < LEAST_SEEN or (alone and not _is_in_range(image.camera)):
-            refined.deregister_frame(image.frame_id)
+
+    def is_weak(image: pycolmap.Image) -> bool:
+        return image.num_points3D < LEAST_SEEN or (image.camera_id not in often and not _is_in_range(image.camera))
+
+    while weak := [image for image in map(refined.image, refined.reg_image_ids()) if is_weak(image)]:
+        refined.deregister_frame(weak[0].frame_id)  # which takes points from others
     for key in set(refined.cameras) - set(often):
         _in_opencv(refined.cameras[key])
     return refined
