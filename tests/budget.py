@@ -17,9 +17,9 @@ else:
 ROOT = Path(__file__).parents[1]
 
 
-def n_lines(root: Path, patterns: list[str]) -> int:
+def n_lines(patterns: list[str]) -> int:
     """The number of lines of the files that match."""
-    files = {path for pattern in patterns for path in root.glob(pattern) if path.is_file()}
+    files = {path for pattern in patterns for path in ROOT.glob(pattern) if path.is_file()}
     return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files)
 
 
@@ -50,17 +50,17 @@ def arrows(imports: Mapping[str, set[str]]) -> set[tuple[str, str]]:
     return {(package[a], package[b]) for a, targets in imports.items() for b in targets if package[a] != package[b]}
 
 
-def counts(root: Path, budget: Mapping) -> dict[str, tuple[int, int, int]]:
+def counts(budget: Mapping) -> dict[str, tuple[int, int, int]]:
     """What there is, the most that there may be, and the aim, by name."""
     imports = core_imports()
-    found = {name: n_lines(root, part["files"]) for name, part in budget["lines"].items()}
+    found = {name: n_lines(part["files"]) for name, part in budget["lines"].items()}
     found |= {"packages": len(set(packages(imports).values())), "arrows": len(arrows(imports))}
     return {name: (found[name], part["most"], part["aim"]) for name, part in (budget["lines"] | budget["core"]).items()}
 
 
-def main(root: Path = ROOT, budget: Path = ROOT / "tests" / "budget.toml") -> int:
+def main() -> int:
     """Prints a line for each part; returns 1 where one exceeds its budget."""
-    found = counts(root, toml.loads(budget.read_text()))
+    found = counts(toml.loads((ROOT / "tests/budget.toml").read_text()))
     for name, (count, most, aim) in found.items():
         print(f"{name:10}{count:8,} of {most:6,}, aim {aim:6,}{'   exceeds its budget' if count > most else ''}")
     return int(any(count > most for count, most, _ in found.values()))

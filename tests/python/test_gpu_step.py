@@ -20,7 +20,6 @@ from pretend_graphs import graphs_on_the_cpu
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.devices import tensor_cores
-from splitnerf.render import model as rendering
 from splitnerf.render.renderer import FoundSamples
 from splitnerf.training.batches import Batch, draw_batch
 from splitnerf.training.gpu_step import SAMPLE_SLACK, in_units
@@ -223,33 +222,6 @@ def test_a_step_agrees_with_float64(side, truth, device):
     assert there.model.sums_light and there.model.bits and not there.model.is_unoccluded  # all caches were read
     terms = {"colour", "neutral", "light_prior", "entropy", "gradient of variance", "gradient of light.texels, level 2"}
     assert terms < true.numbers.keys() and true.numbers["colour"] != on_cpu.numbers["colour"]  # it was in float64
-
-
-def test_what_is_wrong_is_found(side, truth, monkeypatch):
-    """A changed weight in many numbers, a dropped gradient in its own, a term that is not there."""
-    work, draws, true, on_cpu = truth
-    there = side.restored("cpu")
-
-    def wrong() -> set[str]:
-        return beyond(true, on_cpu, answer(there, work, draws))
-
-    corrected = rendering.summed_correction
-    with monkeypatch.context() as patch:
-        patch.setattr(
-            rendering,
-            "summed_correction",
-            lambda *x, radiance, **named: corrected(*x, radiance=radiance.detach(), **named),
-        )
-        assert wrong() == {f"gradient of light.texels, level {i}" for i in range(3)}
-    there.model.material.net[0].bias.requires_grad_(False)
-    assert wrong() == {"gradient of material.net.0.bias"}
-    with torch.no_grad():
-        there.model.sdf_field.hidden_bias[0] += 0.01 * there.model.sdf_field.hidden_bias.norm()
-    assert len(wrong()) > 5
-    ones, none = torch.ones(4), torch.zeros(4)
-    assert error_of(ones * 1.5, ones) == 0.5 and error_of(none, none) == 0.0 and error_of(None, None) == 0.0
-    for got, expected in ((ones, none), (None, ones), (ones, None), (ones[:2], ones), (ones * math.nan, ones)):
-        assert error_of(got, expected) == math.inf
 
 
 class Graphed:

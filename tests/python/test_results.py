@@ -1,6 +1,5 @@
-"""The program of the result pages: what is missing, what a page says, and that rows come back."""
+"""The program of the result pages: what a page says, and that rows come back."""
 
-import pytest
 from bench import results
 
 SCORES = {column: "1.0" for column in results.SCORES}
@@ -18,11 +17,6 @@ def row(scene, minutes, asset, relit, **other):
     }
     values |= {"scene": scene, "minutes": minutes, "asset": asset, "date": "2026-01-02 10:00"} | SCORES
     return values | {"relit, dB": relit} | other
-
-
-def run(monkeypatch, tmp_path, *words):
-    monkeypatch.setattr("sys.argv", ["results.py", "--out", str(tmp_path), "--work", str(tmp_path / "work"), *words])
-    return results.main()
 
 
 def test_means_are_over_what_is_delivered():
@@ -57,20 +51,3 @@ def test_a_page_says_its_rows_and_the_commit_of_the_oldest(monkeypatch, tmp_path
     assert "commit abc" in head and "date 2026-01-02" in head and "avx" not in head  # each row names its kernels
     assert "| knot | 30 |" in lines[2] and " 32.5 " in lines[2] and "avx2" in lines[2] and "avx512" in lines[3]
     assert "Mean of 2 runs of 30 minutes: relit 31.0 dB" in text
-
-
-@pytest.mark.parametrize("there", [False, True])
-def test_what_is_missing_is_listed(monkeypatch, tmp_path, capsys, there):
-    if there:
-        results.write_page(tmp_path, "scenes", [row("knot", "30", "refined", "32.5")], tmp_path)
-    assert run(monkeypatch, tmp_path, "scenes", "paper", "--only", "knot", "rings", "--list") == 0
-    out = capsys.readouterr().out
-    assert ("scenes: knot, cpu, 30 minutes, seed 0" in out) == (not there) and "scenes: rings, cpu" in out
-    assert "paper: knot, paper, 300 minutes" in out
-    assert f"{2 * 330 + (1 if there else 2) * 30:g} minutes of training are missing" in out
-
-
-def test_an_unknown_page_is_refused(monkeypatch, tmp_path, capsys):
-    with pytest.raises(SystemExit):
-        run(monkeypatch, tmp_path, "scene")
-    assert "unknown page scene; there are shapes, scenes" in capsys.readouterr().err

@@ -1,8 +1,7 @@
-"""The structure of the code: layers, budgets, and the walk of a step."""
+"""The structure of the code: layers, and no circles."""
 
 from graphlib import CycleError, TopologicalSorter
 
-import budget
 import grimp
 import pytest
 
@@ -72,55 +71,3 @@ def test_imports_run_down_the_layers_and_none_of_the_core_is_of_a_tool(imports):
 
 def test_no_module_imports_itself_in_a_circle(imports):
     assert circle(imports) == []
-
-
-def test_a_planted_import_is_found(imports):
-    """Of the training in a field: it runs up the layers and closes a circle."""
-    planted = {**imports, "splitnerf.fields.surface": imports["splitnerf.fields.surface"] | {"splitnerf.training.loop"}}
-    assert wrong_way(planted) == ["splitnerf.fields.surface imports splitnerf.training.loop"]
-    assert {"splitnerf.fields.surface", "splitnerf.training.loop"} <= set(circle(planted))
-
-
-def test_a_planted_import_of_a_tool_is_found(imports):
-    planted = {**imports, "splitnerf.pipeline": imports["splitnerf.pipeline"] | {"splitnerf_tools.view.training_page"}}
-    assert wrong_way(planted) == ["splitnerf.pipeline imports splitnerf_tools.view.training_page"]
-
-
-# ---- budgets ----
-
-
-SMALL_LAYERS = {
-    "splitnerf.errors": set(),
-    "splitnerf.data.photos": {"splitnerf.errors"},
-    "splitnerf.data.lens": {"splitnerf.data.photos"},
-    "splitnerf.pipeline": {"splitnerf.data.photos", "splitnerf.errors"},
-    "splitnerf.cli.train": {"splitnerf.pipeline", "splitnerf.data.lens"},
-    "splitnerf.__main__": {"splitnerf.cli.train"},
-}
-
-
-def test_lines_are_counted_once_each(tmp_path):
-    (tmp_path / "a/b").mkdir(parents=True)
-    (tmp_path / "a/one.py").write_text("1\n2\n")
-    (tmp_path / "a/b/two.py").write_text("1\n\n3")
-    (tmp_path / "a/b/other.md").write_text("1\n")
-    assert budget.n_lines(tmp_path, ["a/**/*.py", "a/*.py"]) == 5
-
-
-def test_loose_modules_join_packages_and_arrows_within_one_do_not_count():
-    found = {m.split(".", 1)[1]: p for m, p in budget.packages(SMALL_LAYERS).items()}
-    packages = {"data.photos": "data", "data.lens": "data", "pipeline": "run", "cli.train": "cli", "__main__": "cli"}
-    assert found == packages | {"errors": "base"}
-    arrows = {f"{a} {b}" for a, b in budget.arrows(SMALL_LAYERS)}
-    assert arrows == {"data base", "run data", "run base", "cli run", "cli data"}
-
-
-def test_a_part_that_outgrows_its_budget_fails(tmp_path, capsys):
-    (tmp_path / "one.py").write_text("1\n" * 7)
-    limits = '[lines]\ncore = {{ files = ["*.py"], most = {}, aim = 2 }}\n[core]\npackages = {{ most = 99, aim = 1 }}\n'
-    limits += "arrows = {{ most = 999, aim = 1 }}\n"
-    for most, code in ((7, 0), (6, 1)):
-        (tmp_path / "budget.toml").write_text(limits.format(most))
-        assert budget.main(tmp_path, tmp_path / "budget.toml") == code
-        said = capsys.readouterr().out
-        assert said.startswith("core             7 of") and ("exceeds" in said) == bool(code)
