@@ -1,4 +1,4 @@
-// What the tests of formulas share: seeded inputs, arrays that should agree, and gradients by central differences.
+// What the tests of formulas share: seeded inputs, and arrays that should agree.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -42,25 +42,6 @@ inline double inner(const std::vector<double>& a, const std::vector<double>& b) 
   double total = 0;
   for (size_t i = 0; i < a.size(); ++i) total += a[i] * b[i];
   return total;
-}
-
-// `gradient` against central differences of the scalar function f() in the numbers x that it reads;
-// the error counts relative to the largest component.
-template <class F>
-void expect_gradient(F f, std::vector<double>& x, const std::vector<double>& gradient, double tolerance,
-                     const char* what, double step = 1e-5) {
-  ASSERT_EQ(x.size(), gradient.size()) << what;
-  double largest = 1e-6;
-  for (double g : gradient) largest = std::max(largest, std::abs(g));
-  for (size_t i = 0; i < x.size(); ++i) {
-    const double kept = x[i];
-    x[i] = kept + step;
-    const double above = f();
-    x[i] = kept - step;
-    const double below = f();
-    x[i] = kept;
-    EXPECT_NEAR(gradient[i], (above - below) / (2 * step), tolerance * largest) << what << "[" << i << "]";
-  }
 }
 
 // Equal up to a share of the largest expected number.

@@ -1,4 +1,4 @@
-// The hash grid's geometry, exact encodings, its transpose, and its kernels on every instruction set.
+// The hash grid's large indices, its transpose, and its kernels on every instruction set. Its values: tests/reference.py.
 #include "splitnerf/hash_grid.h"
 
 #include <sys/mman.h>
@@ -13,8 +13,6 @@
 namespace splitnerf {
 namespace {
 
-constexpr HashGridShape kSmall{4, 2, 4, 1.7, 8};  // two dense levels, two hashed ones
-
 std::vector<HashLevel> levels_of(const HashGridShape& shape) {
   std::vector<HashLevel> levels(shape.n_levels);
   hash_levels(shape, levels.data());
@@ -25,32 +23,6 @@ int64_t n_entries(const HashGridShape& shape) {
   return hash_levels(shape, levels.data());
 }
 
-// ---- geometry and index functions ----
-
-TEST(HashLevels, ResolutionsGrowGeometrically) {
-  const HashGridShape doubling{12, 2, 16, 2.0, 14};
-  for (int l = 0; l < 12; ++l) EXPECT_EQ(level_resolution(doubling, l), 16 << l);
-  // 16 levels from 32 by 1.3195079 end at 2048.
-  const HashGridShape paper{16, 2, 32, 1.3195079, 19};
-  EXPECT_EQ(level_resolution(paper, 0), 32);
-  EXPECT_EQ(level_resolution(paper, 15), 2047);
-}
-
-TEST(HashLevels, DenseWhereEveryNodeFits) {
-  const std::vector<HashLevel> levels = levels_of({4, 2, 4, 1.7, 8});
-  // Resolutions 4, 6, 11, 19: 125 nodes fit into 256 entries, 343 do not.
-  const int resolutions[] = {4, 6, 11, 19};
-  int64_t offset = 0;
-  for (int l = 0; l < 4; ++l) {
-    EXPECT_EQ(levels[l].resolution, resolutions[l]);
-    EXPECT_EQ(levels[l].dense, l == 0);
-    EXPECT_EQ(levels[l].n_entries, l == 0 ? 125 : 256);
-    EXPECT_EQ(levels[l].offset, offset);
-    offset += levels[l].n_entries;
-  }
-  EXPECT_EQ(n_entries(kSmall), offset);
-}
-
 TEST(HashIndex, DenseEntriesCountEveryNodeOnceUpToTheLargestLevel) {
   std::vector<int> seen(6 * 6 * 6);
   for (int x = 0; x < 6; ++x)
@@ -58,19 +30,6 @@ TEST(HashIndex, DenseEntriesCountEveryNodeOnceUpToTheLargestLevel) {
       for (int z = 0; z < 6; ++z) ++seen.at(node_entry<true>(x, y, z, 5, 216));
   for (int count : seen) EXPECT_EQ(count, 1);
   EXPECT_EQ(node_entry<true>(1023, 1023, 1023, 1023, 1u << 30), (1u << 30) - 1);
-}
-
-TEST(HashIndex, SpatialHashIsTheXorOfPrimeMultiplesModuloTwoToThe32) {
-  EXPECT_EQ(spatial_hash(1, 0, 0, 1u << 20), 1u);
-  EXPECT_EQ(spatial_hash(0, 1, 0, 1u << 31), 2654435761u & 0x7fffffffu);
-  EXPECT_EQ(spatial_hash(0, 0, 1, 1u << 31), 805459861u);
-  Random random(1);
-  for (int i = 0; i < 1000; ++i) {
-    const auto x = uint64_t(random.below(1 << 30)), y = uint64_t(random.below(1 << 30)),
-               z = uint64_t(random.below(1 << 30));
-    const uint64_t wide = x ^ (y * 2654435761ull & 0xffffffffull) ^ (z * 805459861ull & 0xffffffffull);
-    EXPECT_EQ(spatial_hash(uint32_t(x), uint32_t(y), uint32_t(z), 1u << 19), wide % (1u << 19));
-  }
 }
 
 // Entries past 2^32 floats, in memory that is reserved but only touched where it is read.
@@ -95,8 +54,6 @@ TEST(HashIndex, KernelsReachEntriesPastTwoToThe32) {
   munmap(memory, bytes);
 }
 
-// ---- encodings that are known exactly ----
-
 struct Encoding {
   std::vector<double> features, jacobian;
 };
@@ -109,53 +66,6 @@ Encoding encode(const HashGridShape& shape, int n_active, const std::vector<doub
                                     int64_t(n),    x.data(),         table.data()};
   kernels<double>().hash_encode(args, 0, args.n_points, e.features.data(), e.jacobian.data());
   return e;
-}
-
-constexpr double kSlope[2][3] = {{1, -2, 3}, {0.5, 0.25, -4}};
-double linear(int f, const double* p) { return f + kSlope[f][0] * p[0] + kSlope[f][1] * p[1] + kSlope[f][2] * p[2]; }
-
-// Two dense levels whose nodes hold a linear field.
-constexpr HashGridShape kDense{2, 2, 5, 2.0, 12};
-std::vector<double> linear_table() {
-  std::vector<double> table(size_t(n_entries(kDense)) * 2);
-  for (const HashLevel& level : levels_of(kDense)) {
-    for (int x = 0; x <= level.resolution; ++x)
-      for (int y = 0; y <= level.resolution; ++y)
-        for (int z = 0; z <= level.resolution; ++z) {
-          const double p[] = {double(x) / level.resolution, double(y) / level.resolution, double(z) / level.resolution};
-          for (int f = 0; f < 2; ++f)
-            table[size_t(level.offset + node_entry<true>(x, y, z, level.resolution, uint32_t(level.n_entries))) * 2 +
-                  f] = linear(f, p);
-        }
-  }
-  return table;
-}
-
-TEST(HashEncode, ReproducesALinearFieldAndItsJacobian) {
-  Random random(3);
-  std::vector<double> x = random.uniforms(3 * 500);
-  x.insert(x.end(), {0, 0, 0, 1, 1, 1, 0.2, 0.4, 1, 0.6, 0, 0.5});  // corners and nodes
-  const Encoding e = encode(kDense, 2, x, linear_table());
-  for (size_t i = 0; i < x.size() / 3; ++i) {
-    for (int column = 0; column < 4; ++column) {
-      EXPECT_NEAR(e.features[4 * i + column], linear(column % 2, &x[3 * i]), 1e-12);
-      for (int axis = 0; axis < 3; ++axis)
-        EXPECT_NEAR(e.jacobian[12 * i + 4 * axis + column], kSlope[column % 2][axis], 1e-11);
-    }
-  }
-}
-
-TEST(HashEncode, ClampsOutsideWithAZeroGradientAlongThatAxis) {
-  const std::vector<double> x{-0.5, 0.3, 0.7, 0.4, 2.0, 0.1, 0.4, 0.6, -1e30},
-      inside{0, 0.3, 0.7, 0.4, 1, 0.1, 0.4, 0.6, 0};
-  const Encoding e = encode(kDense, 2, x, linear_table()), at = encode(kDense, 2, inside, linear_table());
-  for (int point = 0; point < 3; ++point) {
-    for (int column = 0; column < 4; ++column) {
-      EXPECT_EQ(e.features[4 * point + column], at.features[4 * point + column]);
-      for (int axis = 0; axis < 3; ++axis)
-        EXPECT_NEAR(e.jacobian[12 * point + 4 * axis + column], axis == point ? 0 : kSlope[column % 2][axis], 1e-11);
-    }
-  }
 }
 
 // ---- adjoints ----

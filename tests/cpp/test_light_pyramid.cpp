@@ -1,4 +1,4 @@
-// The octahedral map and the light's lookup: inverses, and the instruction sets against each other.
+// The light's lookup and products with sparse maps: the instruction sets against each other.
 #include "splitnerf/light_pyramid.h"
 
 #include <vector>
@@ -12,22 +12,6 @@ namespace splitnerf {
 namespace {
 
 constexpr int kPoints = 203;  // no multiple of a register's lanes
-
-TEST(Octahedral, PointsAndTexelsComeBack) {
-  for (uint32_t i = 0; i < 1000; ++i) {
-    const Vec3<double> w = fibonacci_sphere<double>(i, 1000);
-    const Vec3<double> back = normalize(octahedral_point(octahedral_encode(w)));
-    EXPECT_LT(length(back - w), 1e-14);
-  }
-  for (int n : {4, 7, 64})
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const auto f = octahedral_footprint(n, octahedral_texel_centre<double>(n, i, j));
-        double share = 0;
-        for (int k = 0; k < 4; ++k) share += f.texel[k] == j * n + i ? f.weight(k) : 0;
-        EXPECT_NEAR(share, 1, 1e-12);
-      }
-}
 
 // A pyramid of two maps, with everything that a kernel call needs.
 template <class T> struct Scene {

@@ -1,4 +1,4 @@
-// The telescoped product of NeuS weights, limits, and NaN. How many digits weights and adjoints keep: tests/stability/rays.py.
+// Limits of NeuS weights, and NaN. Their values and how many digits they keep: tests/reference.py, tests/stability/rays.py.
 #include "splitnerf/neus.h"
 
 #include <limits>
@@ -12,16 +12,6 @@ namespace {
 using Wide = long double;
 
 Wide wide_softplus(Wide x) { return (x > 0 ? x : 0) + std::log1p(std::exp(-std::abs(x))); }
-
-// alpha = 1 - Phi(f_next) / Phi(f_prev) of the very numbers that the float formula is given. Where the
-// difference of softplus would cancel, their integral sigmoid(-s f) ds f by Simpson's rule.
-Wide reference_alpha(Wide f_prev, Wide f_next, Wide s) {
-  if (f_prev <= f_next) return 0;
-  const Wide d = s * (f_prev - f_next);
-  if (d > 1e-3L) return -std::expm1(wide_softplus(-s * f_prev) - wide_softplus(-s * f_next));
-  const auto sigmoid = [](Wide x) { return x >= 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); };
-  return -std::expm1(-d / 6 * (sigmoid(-s * f_prev) + 4 * sigmoid(-s * (f_prev + f_next) / 2) + sigmoid(-s * f_next)));
-}
 
 // A wall of depth 25 deep inside, where the distances at its ends have lost the digits of their difference.
 TEST(Neus, DepthFarBehindTheSurfaceIsTheDifference) {
@@ -63,19 +53,6 @@ template <class T> Ray<T> falling_ray(double f0, double slope, int n, T s, T min
   return ray;
 }
 
-TEST(Neus, OpacityIsTheSumOfWeightsAndTheTelescopedRatio) {
-  for (const double s : {5., 64., 8103.}) {
-    for (const double slope : {0.01, 0.4, 1.5}) {
-      const Ray<float> ray = falling_ray(0.3, slope, 100, float(s));
-      double total = 0;
-      for (float w : ray.weights) total += w;
-      const double expected = double(reference_alpha(0.3L, 0.3L - slope, s));
-      EXPECT_NEAR(total, ray.opacity, 3e-6) << s << " " << slope;
-      EXPECT_NEAR(ray.opacity, expected, 2e-5 * expected + 1e-30) << s << " " << slope;
-    }
-  }
-}
-
 TEST(Neus, NanReachesTheCaller) {
   Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
   ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
@@ -83,18 +60,6 @@ TEST(Neus, NanReachesTheCaller) {
   EXPECT_TRUE(std::isnan(opacity));
   EXPECT_FALSE(std::isnan(ray.weights[3]));
   EXPECT_TRUE(std::isnan(ray.weights[4]));
-}
-
-TEST(AnnealedCosine, GoesFromSoftToSharp) {
-  const double cosines[] = {-1, 0, 1}, soft[] = {-1, -0.5, 0}, sharp[] = {-1, 0, 0};
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(annealed_cosine(cosines[i], 0.0).value, soft[i]);
-    EXPECT_EQ(annealed_cosine(cosines[i], 1.0).value, sharp[i]);
-  }
-  for (double c : {-0.7, 0.4}) {
-    const double h = 1e-6, slope = (annealed_cosine(c + h, 0.3).value - annealed_cosine(c - h, 0.3).value) / (2 * h);
-    EXPECT_NEAR(annealed_cosine(c, 0.3).slope, slope, 1e-9) << c;
-  }
 }
 
 }  // namespace

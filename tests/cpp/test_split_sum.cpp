@@ -74,23 +74,6 @@ TEST(BrdfTable, NeverGainsEnergy) {
   }
 }
 
-// ---- query_direction ----
-
-TEST(QueryDirection, MirrorsWhenSmoothAndFollowsTheNormalWhenRough) {
-  Random random(4);
-  for (int i = 0; i < 100; ++i) {
-    const Vec3<double> n = random.direction(), v = random.direction();
-    const Vec3<double> turned = n * facing(n, v), w_r = reflect(turned, v);
-    EXPECT_NEAR(dot(w_r, turned), dot(v, turned), 1e-12);
-    EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 0.3) - w_r), 1e-12);
-    EXPECT_LT(length(query_direction(brdf_lut(), false, n, v, 0.9) - w_r), 1e-12);
-    EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 1.0) - turned), 3e-3);
-    EXPECT_LT(length(query_direction(brdf_lut(), true, n, v, 0.6) - query_direction(brdf_lut(), true, -n, v, 0.6)),
-              1e-12);
-    EXPECT_NEAR(length(query_direction(brdf_lut(), true, n, v, 0.6)), 1, 1e-12);
-  }
-}
-
 // ---- shading ----
 
 ShadePoint<double> white_point(Random& random) {
@@ -112,13 +95,6 @@ TEST(Shading, WhiteFurnaceReturnsWhite) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(metal[c], 1, 1e-12);
     EXPECT_LE(split_sum_shade(brdf_lut(), {FresnelMode::kExact, false}, p).x, 1.001);
   }
-}
-
-// By hand at n.v = 1/4: (3/4)^5 = 243/1024.
-TEST(Shading, FresnelTermAsPublished) {
-  const double c5 = 243.0 / 1024;
-  EXPECT_NEAR(fresnel_term(0.04, 0.5, 0.25).value, 0.04 + 0.46 * c5, 1e-15);
-  EXPECT_NEAR(fresnel_term(0.04, 0.99, 0.25).value, 0.04 - 0.03 * c5, 1e-15);
 }
 
 TEST(DielectricFresnel, MeetsItsClosedForms) {
