@@ -138,23 +138,6 @@ TEST_F(Occlusion, UnderASphereIsClosedForm) {
   }
 }
 
-// A wall of height H at distance x hides (1 - x / sqrt(x^2 + H^2)) / 2 of a floor point's hemisphere.
-TEST_F(Occlusion, RightAngledCornerIsClosedForm) {
-  TestMesh mesh;
-  add_quad(mesh, {-10, -1000, 0}, {20, 0, 0}, {0, 2000, 0});  // floor z = 0
-  add_quad(mesh, {0, -1000, 0}, {0, 2000, 0}, {0, 0, 3});     // wall x = 0
-  const Scene scene = make_scene(mesh);
-  for (const double x : {0.1, 1., 4.}) {
-    const double height = 3 - 0.0125;
-    const Factors o = factors(scene, {x, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1));
-    EXPECT_NEAR(o.d[0], 1 - (1 - x / std::sqrt(x * x + height * height)) / 2, 2e-3) << x;
-  }
-  // In the corner of two infinite planes half of it is left.
-  TestMesh tall;
-  add_quad(tall, {0, -1000, -1000}, {0, 2000, 0}, {0, 0, 2000});
-  EXPECT_NEAR(factors(make_scene(tall), {0.01, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(1)).d[0], 0.5, 2e-3);
-}
-
 TEST_F(Occlusion, BlackLightFallsBackToGeometry) {
   const Scene scene = make_scene(lifted_sphere(2));
   const Factors black = factors(scene, {0, 0, 0}, {0, 0, 1}, {0, 0, 1}, 0.5, constant(0));
