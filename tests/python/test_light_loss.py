@@ -1,11 +1,14 @@
-"""The light's consistency loss by lights whose integrals are known, and what the other terms draw."""
+"""The light's consistency loss by lights whose integrals are known, and what the other terms draw and see."""
 
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 from op_checks import generator
+from splitnerf.data.environment import seen_at
+from splitnerf.fields import LightPyramid
 from splitnerf.training import losses
 from test_physics import rays
 from tiny_runs import tiny
@@ -207,3 +210,25 @@ def test_similar_materials_attract_each_other():
         for slope, sign, x in zip(leaf.grad, (-1, 1), by_width):
             expected = sign * attraction * x / width / math.sqrt(columns)
             assert slope.tolist() == pytest.approx([expected] * columns, rel=0.05), name
+
+
+def test_what_is_seen_pulls_the_light():
+    surroundings = np.zeros((16, 32, 4), np.float32)
+    surroundings[8:] = [0.2, 0.4, 0.8, 1.0]
+    radiance, known = seen_at(surroundings, np.array([[0, 0, -1.0], [0, 0, 1.0], [0.6, 0, -0.8]]))
+    assert np.allclose(radiance[[0, 2]], [0.2, 0.4, 0.8]) and known.tolist() == [1, 0, 1]
+    light = LightPyramid(16)
+    seen = losses.SeenLight(surroundings, torch.device("cpu"))
+    optimiser = torch.optim.Adam(light.parameters(), lr=0.05)
+    for _ in range(150):
+        optimiser.zero_grad()
+        evaluated = light.evaluate()
+        loss = seen.loss(evaluated)
+        loss.backward()
+        evaluated.backward()
+        optimiser.step()
+    assert loss.item() < 0.02
+    down, up = torch.tensor([[0, 0, -1.0]]), torch.tensor([[0, 0, 1.0]])
+    none = torch.zeros(1, 1)
+    assert torch.allclose(light(down, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
+    assert not torch.allclose(light(up, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)

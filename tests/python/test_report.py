@@ -5,7 +5,6 @@ import gzip
 import html
 import io
 import json
-import os
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -355,23 +354,6 @@ def test_pictures_under_other_lights_are_those_of_the_path_tracer(ball):
 def test_pictures_under_other_lights_are_at_most_twice_as_large_as_the_photos(ball, monkeypatch, photo, side):
     monkeypatch.setattr(report_run, "RELIT_SIDE", 32)
     assert {picture.shape for _, picture in relit_pictures(ball, photo)} == {(side, side, 3)}
-
-
-def test_failed_report_keeps_the_old_one(tmp_path, monkeypatch):
-    def replace_unless_page(source, target, replace=os.replace):
-        if Path(target).suffix == ".html":
-            raise OSError("no space left")
-        replace(source, target)
-
-    write(tmp_path)
-    before = (tmp_path / "report.html").read_bytes()
-    with pytest.raises(KeyError):
-        write(tmp_path, lights=[{"g": np.ones((4, 8, 3))}])
-    monkeypatch.setattr("os.replace", replace_unless_page)
-    with pytest.raises(OSError, match="no space"):
-        write(tmp_path, title="new")
-    assert (tmp_path / "report.html").read_bytes() == before
-    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_chart_places_points_and_drops_what_cannot_be_drawn():

@@ -88,9 +88,9 @@ def test_an_interruption_before_the_first_checkpoint_says_what_to_do(
     assert train(*command, *more) == DONE
 
 
-def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys, number=signal.SIGTERM):
+def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypatch, capsys):
     """As Ctrl-C does: here while the meshes are exported."""
-    monkeypatch.setattr("splitnerf.pipeline.write_assets", lambda *_, **__: signal.raise_signal(number))
+    monkeypatch.setattr("splitnerf.pipeline.write_assets", lambda *_, **__: signal.raise_signal(signal.SIGTERM))
     assert train(data, tmp_path / "run", "--steps", "8") == INTERRUPTED
     assert "interrupted" in capsys.readouterr().err and not (tmp_path / "run" / LOCK).exists()
     monkeypatch.undo()
