@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def find_masks(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> float:
     from splitnerf_tools.separation.separate import separate
 
-    return separate(train, test, folder, steps=steps, minutes=minutes, seed=seed).seconds
+    return separate(train, test, folder, steps=steps, minutes=minutes, seed=seed)
 
 
 def write_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:

@@ -116,21 +116,19 @@ def chart_of(
     times: Times | Mapping[tuple[str, str], Quartiles],
     errors: Mapping[tuple[str, str], float],
     default: Collection[tuple[str, str]],
-    scale: float = 1e3,
 ) -> Chart:
-    """Times against errors.
+    """Times in milliseconds against errors.
 
     Args:
         title, cost, error: The texts of :class:`splitnerf_tools.bench.charts.Chart` with these names.
         times: Seconds by series and variant.
         errors: Errors by series and variant, in the order of the table.
         default: The keys of the library's defaults.
-        scale: The number of units of cost in a second.
     """
     points = []
     for key, value in errors.items():
-        t = times[key]
-        points.append(Point(*key, scale * t.median, value, scale * t.low, scale * t.high, key in default))
+        median, low, high = (1e3 * x for x in times[key])
+        points.append(Point(*key, median, value, low, high, key in default))
     return Chart(title, cost, error, points)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import torch
 from splitnerf import _core
@@ -63,20 +64,11 @@ class Truth:
         return torch.cat(means).float()
 
 
-def uniform(light: MapLight, n: int, with_queries: bool) -> Estimate:
-    """Independent directions, as published; `with_queries` adds the queries to them, as in the released code."""
+def shared(light: MapLight, draw: Callable[[], Tensor], with_queries: bool = False) -> Estimate:
+    """The same directions for all queries; `with_queries` adds the queries to them, as in the released code."""
 
     def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
-        directions = F.normalize(torch.randn(n, 3), dim=1)
-        directions = torch.cat([directions, axes]) if with_queries else directions
-        return prefilter_light(axes, roughness, light_dirs=directions, light=light(directions))
-
-    return estimate
-
-
-def fibonacci(light: MapLight, n: int) -> Estimate:
-    def estimate(axes: Tensor, roughness: Tensor) -> Tensor:
-        directions = fibonacci_directions(n)
+        directions = torch.cat([draw(), axes]) if with_queries else draw()
         return prefilter_light(axes, roughness, light_dirs=directions, light=light(directions))
 
     return estimate
@@ -114,11 +106,6 @@ def lobe_integral(roughness: Tensor) -> Tensor:
     return torch.where(b > 1e-4, 2 * a2 / b.clamp(min=1e-9) ** 2 * (y - torch.log1p(y)), torch.ones_like(a2)).float()
 
 
-def pyramid(light: MapLight, resolution: int) -> Estimate:
-    """The maps computed anew, as after each step of the light, and a lookup for each query."""
-    return pyramid_of(light, resolution)
-
-
 def harmonics(light: MapLight) -> Estimate:
     """Spherical harmonics of degree 12 from the light's averages, for roughness from `NARROWEST` on."""
     texels = cell_means(light, HARMONIC_RESOLUTION)
@@ -133,20 +120,22 @@ def harmonics(light: MapLight) -> Estimate:
 
 
 def estimators(light: MapLight, quick: bool) -> dict[tuple[str, str], Estimate]:
-    """By (method, setting)."""
+    """By (method, setting); a pyramid's maps are computed anew, as after each step of the light."""
+    uniform = lambda: F.normalize(torch.randn(PUBLISHED, 3), dim=1)  # independent directions, as published
     found: dict[tuple[str, str], Estimate] = {
-        ("uniform (paper)", f"n = {PUBLISHED}"): uniform(light, PUBLISHED, False),
-        ("uniform and queries (code)", f"n = {PUBLISHED}"): uniform(light, PUBLISHED, True),
+        ("uniform (paper)", f"n = {PUBLISHED}"): shared(light, uniform),
+        ("uniform and queries (code)", f"n = {PUBLISHED}"): shared(light, uniform, True),
     }
     found |= {
-        ("Fibonacci", f"n = {n}"): fibonacci(light, n) for n in ((2048, 8192) if quick else (512, 2048, 8192, 32768))
+        ("Fibonacci", f"n = {n}"): shared(light, partial(fibonacci_directions, n))
+        for n in ((2048, 8192) if quick else (512, 2048, 8192, 32768))
     }
     found |= {("own lobe", f"n = {n}"): own_lobe(light, n) for n in ((16, 64) if quick else (4, 16, 64, 256))}
     found |= {
         ("filtered importance", f"n = {n}"): filtered_importance(light, n) for n in ((32,) if quick else (8, 32, 128))
     }
     found[HARMONICS, "degree 12"] = harmonics(light)
-    found |= {("pyramid", f"{n} x {n}"): pyramid(light, n) for n in ((128,) if quick else (64, 128, 256))}
+    found |= {("pyramid", f"{n} x {n}"): pyramid_of(light, n) for n in ((128,) if quick else (64, 128, 256))}
     return found
 
 

@@ -61,25 +61,11 @@ class PrepareSettings:
     turntable: bool = False
 
 
-@dataclass
-class Prepared:
-    """What was prepared.
-
-    Attributes:
-        world: Cameras and points.
-        exposures: The photos' brightness.
-        left_out: Why photos were left out, by name.
-        mask_share: [n] the share of each image that its mask covers.
-    """
-
-    world: World
-    exposures: Exposures
-    left_out: dict[str, str]
-    mask_share: np.ndarray
-
-
-def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]) -> Prepared:
-    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr` and `prepare.html`.
+def prepare(
+    source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
+) -> tuple[Reconstruction, dict[str, str]]:
+    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr` and `prepare.html`; returns the cameras and points, and why
+    photos were left out, by name.
 
     What an interrupted call with the same photos has done in `out/work` is used again.
 
@@ -106,7 +92,7 @@ def prepare(source: Path, out: Path, settings: PrepareSettings, report: Callable
         exposures = exposures_of(world.scene, by_name, report)
         shares = write_data(world, exposures, by_name, masks, out, settings, report)
         write_page(out, world, exposures.gains, shares, left_out, source.resolve().name)
-    return Prepared(world, exposures, left_out, shares)
+    return world.scene, left_out
 
 
 def _photographs(

@@ -82,11 +82,11 @@ def run(args: argparse.Namespace) -> int:
             bar.show(most, step)
 
         try:
-            result = prepare(args.photos, args.out, settings, report)
+            scene, left_out = prepare(args.photos, args.out, settings, report)
         except KeyboardInterrupt:
             raise KeyboardInterrupt("interrupted; the same command continues: features and matches are kept") from None
-    n, lost = len(result.world.scene.names), len(result.left_out)
-    print(f"{n} of {n + lost} photos, reprojection error {result.world.scene.error:.2f} pixels: {args.out}")
+    n, lost = len(scene.names), len(left_out)
+    print(f"{n} of {n + lost} photos, reprojection error {scene.error:.2f} pixels: {args.out}")
     print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")
     return DONE
 

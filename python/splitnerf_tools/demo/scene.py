@@ -102,23 +102,6 @@ def build_environment(height: int = 128) -> np.ndarray:
     return radiance.astype(np.float32)
 
 
-def camera_poses(n: int, *, split: str) -> np.ndarray:
-    """Places cameras that look at the origin from the upper hemisphere.
-
-    Args:
-        n: Number of cameras.
-        split: "train" spreads them evenly over elevations of 4 to 72 degrees; "test" is a turn at 30 degrees.
-
-    Returns:
-        [n, 4, 4] float64 camera-to-world, OpenGL axes.
-    """
-    if split == "train":
-        return spiral(n, CAMERA_DISTANCE, (4, 72))
-    if split == "test":
-        return orbit(n, CAMERA_DISTANCE, 30, start=0.25)
-    raise ValueError(f"camera_poses: split must be 'train' or 'test', got {split!r}")
-
-
 def write_demo_dataset(
     out: Path, *, size: int = 100, n_train: int = 60, n_test: int = 8, spp: int = 64, seed: int = 0
 ) -> Path:
@@ -138,20 +121,17 @@ def write_demo_dataset(
         `out` as a Path.
 
     Raises:
-        ValueError: A count or the size is not positive.
         OSError: A file cannot be written.
     """
     from splitnerf import _core
 
-    for name, value in (("size", size), ("n_train", n_train), ("n_test", n_test), ("spp", spp)):
-        if value < 1:
-            raise ValueError(f"write_demo_dataset: {name} must be at least 1, got {value}")
     writer = SceneWriter(out, CAMERA_ANGLE_X)
     demo, environment = build_scene(), writer.light(build_environment())
     scene = _core.Scene(demo.vertices, demo.triangles)
     focal = 0.5 * size / np.tan(0.5 * CAMERA_ANGLE_X)
-    for split, n in (("train", n_train), ("test", n_test)):
-        for i, pose in enumerate(camera_poses(n, split=split)):
+    train, test = spiral(n_train, CAMERA_DISTANCE, (4, 72)), orbit(n_test, CAMERA_DISTANCE, 30, start=0.25)
+    for split, poses in (("train", train), ("test", test)):
+        for i, pose in enumerate(poses):
             images = _core.render(
                 scene,
                 demo.albedo,

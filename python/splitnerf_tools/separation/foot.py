@@ -91,12 +91,7 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
 
 def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
     """[r, r]: positive where cells are higher than the table and connected to what is under the object, else negative; the size
-    says how clearly.
-
-    Args:
-        medians, counts: [r, r] the median heights of points, and their numbers.
-        over: [r, r] bool, what the object stands or hangs over.
-    """
+    says how clearly."""
     weights = np.minimum(counts / ENOUGH, 1.0)
     others = (weights > 0) & ~over
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0

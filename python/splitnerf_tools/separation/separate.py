@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,24 +30,9 @@ NEAR_TABLE = 1.5  # distance from the middle within which points tell of the tab
 MOST_POINTS = 20000  # of those that the search for the table takes
 
 
-@dataclass(frozen=True)
-class Separated:
-    """What was found.
-
-    Attributes:
-        table: Whether the object stands on a plane, or before a wall.
-        share: The mean share of the photos that the object covers.
-        seconds: The time that it took.
-    """
-
-    table: bool
-    share: float
-    seconds: float
-
-
-def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> Separated:
+def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> float:
     """Writes a mask for each photo, what is behind the object, `surroundings.exr`, and `sheet.jpg`, which shows some of the
-    masks, into an empty folder.
+    masks, into an empty folder; returns the seconds that it took.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
     plane of a table if there is one, and hangs together in the middle, is the object.
@@ -88,11 +72,11 @@ def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, 
         around = surroundings(field, region, points)
         write_image(folder / SURROUNDINGS, around / np.float32([usual] * 3 + [1]))
         write_sheet(train, folder)
-        found = Separated(region.table is not None, float(np.mean(np.concatenate(shares))), time.monotonic() - started)
-        write_json(folder / SEPARATION, vars(found))
-    table = "above a table" if found.table else "without a table under it"
-    note_once(f"{data}: the object, {table}, covers {found.share:.0%} of the photos")
-    return found
+        share, seconds = float(np.mean(np.concatenate(shares))), time.monotonic() - started
+        write_json(folder / SEPARATION, {"table": region.table is not None, "share": share, "seconds": seconds})
+    table = "without a table under it" if region.table is None else "above a table"
+    note_once(f"{data}: the object, {table}, covers {share:.0%} of the photos")
+    return seconds
 
 
 def find_object(field: RadianceField, photos: Dataset, table: Table | None, points: np.ndarray) -> Region:

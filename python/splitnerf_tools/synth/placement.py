@@ -14,16 +14,8 @@ HEADER = 20  # of the file and of its first chunk, which is the JSON
 
 
 def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: float) -> bool:
-    """Writes the asset with a node above its scene that applies (x - centre) scale, and without emission.
-
-    Args:
-        source: A file that `read_asset` accepts.
-        target: The new file, with the suffix .glb.
-        centre: [3] the point of the source's world, z up, that is moved to the origin.
-        scale: The scale that is applied after the move.
-
-    Returns:
-        Whether the file was written; a .gltf is not copied, since its data are in other files.
+    """Writes the asset with a node above its scene that applies (x - centre) scale, `centre` [3] in the source's world, z up, and
+    without emission; whether the file was written, as a .gltf is not copied, whose data are in other files.
 
     Raises:
         OSError: The file cannot be written.

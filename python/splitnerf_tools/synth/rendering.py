@@ -115,15 +115,7 @@ def render_views(
     relight: dict[str, np.ndarray],
     settings: SynthSettings,
 ) -> None:
-    """Renders all views and hands them to the writer.
-
-    Args:
-        renderer: The asset, inside the unit sphere.
-        writer: Takes the views.
-        light: [h, w, 3] linear radiance of the photos.
-        relight: [h, w, 3] each, by name, for the test views.
-        settings: Numbers, size and seed.
-    """
+    """Hands all views to the writer, under the light of the photos and, for the test views, those of relight, [h, w, 3] each."""
     size = settings.size
     focal = 0.5 * size / np.tan(0.5 * CAMERA_ANGLE_X)
     turn = np.random.default_rng(settings.seed).uniform(0, 360) if settings.seed else 0.0
