@@ -54,26 +54,6 @@ TEST(Ggx, DIntegratesToOne) {
   }
 }
 
-// With n = v = w_r the density D/4 of the reflected direction covers the whole sphere.
-TEST(Ggx, QuarterDOfTheHalfAngleIntegratesToOneOverTheSphere) {
-  const Vec3<double> axis = normalize(Vec3<double>{0.3, -0.5, 0.8});
-  for (const double roughness : {0.4, 0.7, 1.0}) {
-    const int n = 200000;
-    double total = 0;
-    for (int i = 0; i < n; ++i)
-      total += ggx_d(ggx_alpha_from_roughness(roughness), sin2_half_angle(fibonacci_sphere<double>(i, n), axis)) / 4;
-    EXPECT_NEAR(total * 4 * kPi / n, 1, 1e-3) << roughness;
-  }
-}
-
-TEST(Ggx, HalfAngleIsThatOfTheMicrofacet) {
-  Random random(1);
-  for (int i = 0; i < 100; ++i) {
-    const Vec3<double> a = random.direction(), b = random.direction(), h = normalize(a + b);
-    EXPECT_NEAR(sin2_half_angle(a, b), 1 - square(dot(h, a)), 1e-12);
-  }
-}
-
 // V = 1 / (4 (n.v)(n.l)(1 + Lambda(v) + Lambda(l))), Lambda = (sqrt(1 + a^2 tan^2) - 1) / 2.
 TEST(Ggx, SmithFollowsItsDefinition) {
   const auto lambda = [](double a, double c) { return (std::sqrt(1 + a * a * (1 - c * c) / (c * c)) - 1) / 2; };

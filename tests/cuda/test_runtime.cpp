@@ -1,7 +1,6 @@
 // That the CPU in a GPU's place does what a GPU does, and finds kernels that are wrong. Compiled as kernels are.
 #include <gtest/gtest.h>
 
-#include <numeric>
 #include <string>
 #include <vector>
 
@@ -24,19 +23,6 @@ std::string failure(void (*kernel)(Parameters...), dim3 grid, unsigned block, si
 
 #define EXPECT_HAS(text, part) EXPECT_NE(std::string(text).find(part), std::string::npos) << text
 
-__global__ void numbers_kernel(int* out) {
-  const unsigned t = threadIdx.x + blockDim.x * (threadIdx.y + blockDim.y * threadIdx.z);
-  const unsigned b = blockIdx.x + gridDim.x * (blockIdx.y + gridDim.y * blockIdx.z);
-  out[b * blockDim.x * blockDim.y * blockDim.z + t] += int(b * 100 + t);
-}
-TEST(Runtime, EachThreadOfEachBlockRunsOnce) {
-  std::vector<int> out(2 * 3 * 4 * 30);
-  Queue queue{};
-  SPLITNERF_LAUNCH(numbers_kernel, dim3(2, 3, 4), dim3(5, 3, 2), 0, queue.stream)(out.data());
-  EXPECT_EQ(cudaGetLastError(), cudaSuccess);
-  for (int i = 0; i < int(out.size()); ++i) EXPECT_EQ(out[i], i / 30 * 100 + i % 30);
-}
-
 __global__ void warp_kernel(double* out) {
   const Warp warp;
   const double x = double(threadIdx.x);
@@ -57,19 +43,6 @@ TEST(Runtime, AWarpAddsUpAndVotes) {
     for (int i = 0; i < 32; ++i) bits |= uint32_t((first + i) % 3 == 0) << i;
     EXPECT_EQ(out[4 * t + 3], bits);
   }
-}
-
-__global__ void atomics_kernel(double* sum, float* four) {
-  atomicAdd(sum, 0.5);
-  atomicAdd(reinterpret_cast<float4*>(four), make_float4(1, 2, 3, 4));
-  atomicAdd(reinterpret_cast<float2*>(four), make_float2(1, 1));
-}
-TEST(Runtime, AtomicsAddUp) {
-  double sum = 1;
-  std::vector<float> four(4);
-  EXPECT_EQ(failure(atomics_kernel, 3, 40, 0, &sum, four.data()), "");
-  EXPECT_EQ(sum, 61);
-  EXPECT_EQ(four, (std::vector<float>{240, 360, 360, 480}));
 }
 
 // Each block has shared memory of its own, and what nobody wrote there is NaN.

@@ -8,6 +8,7 @@ import pytest
 import torch
 import trimesh
 from painted_ball import heights, photos, sky, textured
+from splitnerf import errors
 from splitnerf.cli import DONE
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset, load_dataset
@@ -26,6 +27,12 @@ def tiny_dataset(folder: Path, n_train: int) -> Path:
     write_demo_dataset(folder, size=24, n_train=n_train, n_test=2, spp=4)
     (folder / "mesh.ply").unlink()
     return folder
+
+
+@pytest.fixture(autouse=True)
+def unsaid(monkeypatch) -> None:
+    """No note was written yet."""
+    monkeypatch.setattr(errors, "_said", set())
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from bench import operators, shading, split_sum, tables
+from bench import operators, split_sum, tables
 from splitnerf.cli import DONE, main
 from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
@@ -45,58 +45,38 @@ def test_files_mark_the_front_and_the_default(tmp_path):
     assert [row["on_front"] for row in rows] == ["1", "1", "0", "1"] and rows[3]["default"] == "1"
 
 
-class TestTables:
-    """A checkout with one source and a table of it."""
+def test_a_table_is_stale_once_what_it_measures_has_changed(tmp_path, monkeypatch):
+    (tmp_path / "cpp").mkdir()
+    pages = tmp_path / "docs/benchmarks"
+    pages.mkdir(parents=True)
+    monkeypatch.setattr(tables, "MOST_BEHIND", 1)
 
-    @pytest.fixture
-    def checkout(self, tmp_path):
-        (tmp_path / "cpp").mkdir()
-        (tmp_path / "docs" / "benchmarks").mkdir(parents=True)
-        (tmp_path / "docs" / "prose.md").write_text("| a |\n|---|\n")
-        self.git(tmp_path, "init", "--quiet")
-        self.change(tmp_path, "cpp/hash_grid.h", "1")
-        return tmp_path
+    def change(path: str, text: str) -> None:
+        (tmp_path / path).write_text(text)
+        who = ["git", "-c", "user.name=a", "-c", "user.email=a@example.org"]
+        for words in (["add", "-A"], ["commit", "--quiet", "-m", path]):
+            subprocess.run([*who, *words], cwd=tmp_path, check=True, capture_output=True)
 
-    @staticmethod
-    def git(root, *words):
-        who = ["-c", "user.name=a", "-c", "user.email=a@example.org"]
-        subprocess.run(["git", *who, *words], cwd=root, check=True, capture_output=True)
+    def said(text: str | None = None) -> tuple[str, int]:
+        """Of a page with this text, or measured now; and the program's exit code."""
+        head = text or provenance.header(provenance.provenance(("cpp/*hash*", "python"), root=tmp_path))
+        (pages / "grid.md").write_text(f"# Grid\n\n{head}\n")
+        return tables.states(tmp_path)[Path("docs/benchmarks/grid.md")][0], tables.main(tmp_path)
 
-    def change(self, root, path, text):
-        (root / path).write_text(text)
-        self.git(root, "add", "-A")
-        self.git(root, "commit", "--quiet", "-m", path)
-
-    def measured(self, root):
-        facts = provenance.provenance(("cpp/*hash*", "python"), root=root)
-        (root / "docs" / "benchmarks" / "grid.md").write_text(f"# Grid\n\n{provenance.header(facts)}\n")
-        return self.said(root)
-
-    def said(self, root, page="grid"):
-        return tables.states(root)[Path(f"docs/benchmarks/{page}.md")][0]
-
-    def test_a_change_of_what_is_measured_makes_a_table_stale(self, checkout, monkeypatch):
-        monkeypatch.setattr(tables, "MOST_BEHIND", 1)
-        assert self.measured(checkout) == "fresh"
-        self.change(checkout, "cpp/other.h", "1")
-        assert tables.states(checkout) == {Path("docs/benchmarks/grid.md"): ("fresh", 0)}
-        self.change(checkout, "cpp/hash_grid.h", "2")
-        assert "stale: 1 commits since" in self.said(checkout) and tables.main(checkout) == 0
-        self.change(checkout, "cpp/hash_grid.h", "3")
-        assert "stale: 2 commits since" in self.said(checkout) and tables.main(checkout) == 1
-
-    def test_what_was_measured_with_changes_is_stale(self, checkout):
-        (checkout / "docs" / "prose.md").write_text("x")
-        assert self.measured(checkout) == "fresh"
-        (checkout / "cpp" / "hash_grid.h").write_text("3")
-        assert "stale: made beside changes" in self.measured(checkout) and tables.main(checkout) == 1
-
-    def test_what_says_nothing_of_itself_is_unknown(self, checkout):
-        page = checkout / "docs" / "benchmarks" / "old.md"
-        page.write_text("commit 1234567.")
-        assert self.said(checkout, "old") == "unknown: no head with commit and sources" and tables.main(checkout) == 1
-        page.write_text("commit 1234567; measures `cpp`.")
-        assert "unknown: no commit 1234567" in self.said(checkout, "old") and tables.main(checkout) == 0
+    subprocess.run(["git", "init", "--quiet"], cwd=tmp_path, check=True)
+    change("cpp/hash_grid.h", "1")
+    assert said() == ("fresh", 0)
+    measured = (pages / "grid.md").read_text()
+    change("cpp/other.h", "1")
+    assert said(measured) == ("fresh", 0)
+    for n in (1, 2):
+        change("cpp/hash_grid.h", f"changed {n}")
+        text, code = said(measured)
+        assert f"stale: {n} commits since" in text and code == n - 1
+    (tmp_path / "cpp/hash_grid.h").write_text("3")
+    assert "stale: made beside changes" in said()[0] and said()[1] == 1
+    assert said("commit 1234567.") == ("unknown: no head with commit and sources", 1)
+    assert said("commit 1234567; measures `cpp`.") == ("unknown: no commit 1234567 here", 0)
 
 
 def test_commands_hold_no_path_of_the_machine(monkeypatch):
@@ -135,15 +115,6 @@ def test_calls_are_timed_in_turns_and_compared_round_by_round():
     assert last_a < last_b and "b" in order[:last_a]
     times.seconds = {"a": [2.0, 4.0, 9.0], "b": [1.0, 2.0, 3.0]}
     assert times.ratio("a", "b") == (2.0, 2.0, 2.5) and times["a"].median == 4.0
-
-
-def test_a_wrong_subject_is_refused():
-    inputs = torch.rand(64, 3), torch.rand(64, 3)
-    right, wrong = (lambda a, b: a * b), (lambda a, b: a * b * 1.01)
-    calls, errors = shading.checked({"right": right}, right, inputs)
-    assert errors["right"] < 1e-6 and len(calls["right"]()) == 3
-    with pytest.raises(CheckFailed, match="wrong"):
-        shading.checked({"wrong": wrong}, right, inputs)
 
 
 class TestLights:

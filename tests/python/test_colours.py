@@ -16,12 +16,6 @@ from splitnerf.relight.background import read_plate
 from splitnerf_tools.capture.photographs import find_photographs, read_upright
 
 
-@pytest.fixture(autouse=True)
-def unsaid(monkeypatch):
-    """No note was written yet."""
-    monkeypatch.setattr(errors, "_said", set())
-
-
 def png(pixels: np.ndarray) -> Image.Image:
     return Image.fromarray(pixels)
 

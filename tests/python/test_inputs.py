@@ -8,7 +8,6 @@ import OpenImageIO as oiio
 import pytest
 from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, write_exr
 from PIL import Image
-from splitnerf import errors
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split
@@ -24,12 +23,6 @@ from splitnerf_tools.capture.photographs import find_photographs, read_upright
 from splitnerf_tools.inspection.checks import inspect
 
 DISC = np.hypot(*np.mgrid[-4:5, -4:5]) < 3.5
-
-
-@pytest.fixture(autouse=True)
-def unsaid(monkeypatch):
-    """No note was written yet."""
-    monkeypatch.setattr(errors, "_said", set())
 
 
 def png(pixels: np.ndarray, mode: str | None = None) -> Image.Image:

@@ -272,13 +272,6 @@ def test_parallel_cameras_find_the_object_by_the_masks():
     assert np.linalg.norm(inside) < 0.7 and 0.1 < box[0, 0] * radius <= 1.0
 
 
-def test_cameras_at_one_place_are_named(tmp_path):
-    root = make_blender(tmp_path)
-    edit(root, lambda m: [frame.update(transform_matrix=np.eye(4).tolist()) for frame in m["frames"]])
-    with pytest.raises(InputError, match="all 12 cameras stand at one place; estimate poses, or invert them"):
-        load_dataset(root)
-
-
 @pytest.mark.parametrize("masked", [True, False])
 @pytest.mark.parametrize(
     ("form", "said"),

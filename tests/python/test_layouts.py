@@ -7,7 +7,6 @@ import pytest
 import trimesh
 from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, write_colmap, write_neus, write_transforms
-from splitnerf import errors
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
@@ -30,12 +29,6 @@ LAYOUTS = {
     "COLMAP of nerfstudio": lambda root: write_colmap(root, binary=True, place="colmap/sparse/0"),
     "COLMAP, undistorted": lambda root: write_colmap(root, binary=False, place="sparse"),
 }
-
-
-@pytest.fixture(autouse=True)
-def unsaid(monkeypatch):
-    """No note was written yet."""
-    monkeypatch.setattr(errors, "_said", set())
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

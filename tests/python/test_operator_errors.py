@@ -23,7 +23,7 @@ def test_a_tensor_of_another_shape_or_dtype_is_named(name):
         if not isinstance(x, torch.Tensor) or argument in unread:
             continue
         any_shape = name.startswith(("linear_to_srgb", "srgb_to_linear"))
-        for wrong in ([] if any_shape else [x[None, None]]) + [x.to(torch.complex64)]:
+        for wrong in ([] if any_shape else [x[None, None]]) + [x.to(torch.complex64), x.to(torch.bfloat16)]:
             changed = (*inputs[:i], wrong, *inputs[i + 1 :])
             with pytest.raises(ValueError, match=name) as error:
                 getattr(lib, name)(*changed)

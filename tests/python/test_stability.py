@@ -142,14 +142,6 @@ ROW_BY_ROW = [
 ]
 
 
-@pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])
-@pytest.mark.parametrize("name", ENTRY_OF_EACH)
-def test_half_precision_raises(name, dtype):
-    entry = ENTRY_OF_EACH[name]
-    with pytest.raises(ValueError, match="must be"):
-        entry.call(cast(rows_of(name, 2), dtype), cast(entry.shared, dtype))
-
-
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
 @pytest.mark.parametrize("name", ROW_BY_ROW)
 def test_a_number_that_is_not_finite_stays_in_its_row(name, value):
