@@ -191,7 +191,7 @@ def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
     for name, ball in zip(world.scene.names, truth):
         Image.fromarray(np.where(ball ^ inverted, 255, 0).astype(np.uint8)).save(tmp_path / f"{name}.MP.png")
     (tmp_path / "._p_00.MP.png").write_bytes(b"a Mac's")
-    photos = [Photograph(tmp_path / f"{name}.MP.jpg", name, 320, 240, None, "", None) for name in world.scene.names]
+    photos = [Photograph(tmp_path / f"{name}.MP.jpg", name, 320, 240, None, "") for name in world.scene.names]
     masks = given_masks(world, mask_files(photos, tmp_path), tmp_path, 0)
     assert all((mask == ball).mean() > 0.999 for mask, ball in zip(masks, truth))
     assert ("turned around" in capsys.readouterr().err) == inverted
@@ -205,7 +205,7 @@ def test_given_masks_may_be_black_on_the_object(tmp_path, capsys, inverted):
 
 def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
     """Two photos that differ in their suffixes; two masks that do."""
-    photos = [Photograph(tmp_path / f"a{suffix}", f"a{suffix}", 8, 6, None, "", None) for suffix in (".jpg", ".png")]
+    photos = [Photograph(tmp_path / f"a{suffix}", f"a{suffix}", 8, 6, None, "") for suffix in (".jpg", ".png")]
     Image.new("L", (8, 6)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match=r"a.png: may be the mask of a.jpg or of a.png; call it a.png.png"):
         mask_files(photos, tmp_path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import struct
 from collections.abc import Callable
@@ -22,7 +21,6 @@ COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
-DIAGONAL_35MM = math.hypot(36.0, 24.0)  # millimetres
 WHOLE = 0.95  # share of the frames that a video states which a whole one has
 MAX_PIXELS = 2 * Image.MAX_IMAGE_PIXELS  # of Pillow
 T = Image.Transpose
@@ -40,7 +38,6 @@ class Photograph:
         width, height: The size in pixels, upright.
         exposure: Exposure time times ISO over the squared f-number (seconds), or None where the file does not tell.
         lens: A text that photos taken with one lens at one zoom have in common.
-        focal: The focal length in pixels by the file's 35 mm equivalent, or None.
     """
 
     path: Path
@@ -49,7 +46,6 @@ class Photograph:
     height: int
     exposure: float | None
     lens: str
-    focal: float | None
 
 
 def find_photographs(folder: Path) -> list[Photograph]:
@@ -205,7 +201,7 @@ def _exif(image: Image.Image, path: Path) -> Image.Exif:
 def _described(path: Path, name: str) -> Photograph:
     if path.suffix.lower() in RAW:
         height, width = read_upright(path).shape[:2]
-        return Photograph(path, name, width, height, None, f"{path.suffix} {width}x{height}", None)
+        return Photograph(path, name, width, height, None, f"{path.suffix} {width}x{height}")
     with _open(path) as image:
         exif = _exif(image, path)
         details = exif.get_ifd(ExifTags.IFD.Exif)
@@ -216,11 +212,9 @@ def _described(path: Path, name: str) -> Photograph:
     sensitivity = details.get(ExifTags.Base.ISOSpeedRatings)
     iso = _positive(sensitivity[0] if isinstance(sensitivity, tuple) and sensitivity else sensitivity)
     exposure = seconds * iso / f_number**2 if seconds and f_number and iso else None
-    equivalent = _positive(details.get(ExifTags.Base.FocalLengthIn35mmFilm))
-    focal = equivalent / DIAGONAL_35MM * math.hypot(width, height) if equivalent else None
     maker = [str(exif.get(tag, "")).strip() for tag in (ExifTags.Base.Make, ExifTags.Base.Model)]
     lens = " ".join([*maker, f"{width}x{height}", str(details.get(ExifTags.Base.FocalLength, ""))]).strip()
-    return Photograph(path, name, width, height, exposure, lens, focal)
+    return Photograph(path, name, width, height, exposure, lens)
 
 
 def _positive(value: object) -> float | None:

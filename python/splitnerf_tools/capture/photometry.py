@@ -26,12 +26,10 @@ class Exposures:
     Attributes:
         gains: [n] the factor of each photo's linear values; their geometric mean is 1.
         vignetting: (a, b) of the factor 1 + a r^2 + b r^4, r in half diagonals.
-        deviation: The standard deviation of the observations' logarithms that is left, outliers aside.
     """
 
     gains: np.ndarray
     vignetting: tuple[float, float]
-    deviation: float
 
 
 def find_exposures(
@@ -56,7 +54,7 @@ def find_exposures(
     rows = np.arange(k)
     squares = np.stack([radii**2, radii**4], axis=1)
     corners = np.zeros(2)
-    gains, points, spread = start.copy(), np.zeros(m), np.inf
+    gains, points = start.copy(), np.zeros(m)
     weights = np.ones(k)
     for _ in range(ROUNDS):
         factor = 1 + squares @ corners
@@ -73,6 +71,5 @@ def find_exposures(
         gains, points, corners = x[:n], x[n : n + m], x[n + m :]
         errors = gains[photo_of] + points[point_of] + np.log(np.maximum(1 + squares @ corners, 0.05)) - logs
         weights = 1 / (1 + (errors / OUTLIER) ** 2 / 3)
-        spread = float(np.sqrt((weights * errors**2).sum() / max(weights.sum(), 1e-9)))
     gains = np.exp(gains - gains.mean())
-    return Exposures(gains, (float(corners[0]), float(corners[1])), spread if k else float("nan"))
+    return Exposures(gains, (float(corners[0]), float(corners[1])))
