@@ -8,13 +8,14 @@ import sys
 import pytest
 from splitnerf import plugins
 from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser, main
-from splitnerf.cli.common import SHELLS, commands_of, examples_in
+from splitnerf.cli.common import SHELLS, TITLE, commands_of
 from splitnerf.plugins import installed
 from splitnerf.run_folder import is_finished
 from splitnerf_tools.plugin import PLUGIN
 from tiny_runs import refused, train
 
 PARSERS = commands_of(build_parser())
+EXAMPLES = {name: (parser.epilog or "").partition(TITLE)[2].split("\n")[1:] for name, parser in PARSERS.items()}
 
 
 def script(shell: str, capsys) -> str:
@@ -26,9 +27,8 @@ def script(shell: str, capsys) -> str:
 
 @pytest.mark.parametrize("name", PARSERS)
 def test_examples_are_commands_that_can_be_typed(name):
-    lines = examples_in(PARSERS[name].epilog)
-    assert lines or name in ("bench", "doctor")
-    for line in lines:
+    assert EXAMPLES[name] or name in ("bench", "doctor")
+    for line in EXAMPLES[name]:
         program, *words = shlex.split(line)
         assert program == "splitnerf" and build_parser().parse_args(words).command == name
 
@@ -37,9 +37,8 @@ def test_examples_are_commands_that_can_be_typed(name):
 def test_help_keeps_examples_and_wraps_the_rest(name, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     said = PARSERS[name].format_help().splitlines()
-    examples = [f"  {line}" for line in examples_in(PARSERS[name].epilog)]
-    assert said[len(said) - len(examples) :] == examples
-    assert len(said) <= 66 and all(len(line) <= 80 for line in said if line not in examples)
+    assert said[len(said) - len(EXAMPLES[name]) :] == EXAMPLES[name]
+    assert len(said) <= 66 and all(len(line) <= 80 for line in said if line not in EXAMPLES[name])
 
 
 @pytest.mark.parametrize("shell", SHELLS)

@@ -6,6 +6,7 @@ import os
 
 import pytest
 import torch
+from op_checks import on_threads
 from pretend_gpu import GPU, GpuTensor, pretend_gpu
 from splitnerf.data.dataset import load_dataset
 from splitnerf.devices import in_background
@@ -179,7 +180,7 @@ def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
     data, tmp_path, monkeypatch, device, processors, threads
 ):
     """By all threads that work beside it, and until the last step is made."""
-    seen, advance, before = set(), trainer.Training.advance, torch.get_num_threads()
+    seen, advance = set(), trainer.Training.advance
 
     def watched(training, bar):
         seen.update((torch.get_num_threads(), in_background(torch.get_num_threads).result()))
@@ -187,13 +188,14 @@ def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
 
     monkeypatch.setattr(trainer.Training, "advance", watched)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(processors))
-    try:
-        torch.set_num_threads(8)
-        with pretend_gpu(monkeypatch):
-            train_scene(load_dataset(data), tiny(steps=2), tmp_path, device=device)
-        assert seen == {threads} and torch.get_num_threads() == 8
-    finally:
-        torch.set_num_threads(before)
+
+    def left() -> int:
+        """The threads after a training."""
+        train_scene(load_dataset(data), tiny(steps=2), tmp_path, device=device)
+        return torch.get_num_threads()
+
+    with pretend_gpu(monkeypatch):
+        assert on_threads(8, left) == 8 and seen == {threads}
 
 
 @pytest.mark.parametrize("settings", [{}, {"sparse_steps": True, "table_dtype": "float16"}])

@@ -7,7 +7,7 @@ import pytest
 import torch
 import trimesh
 from mesh_shapes import grid_mesh, scene_of
-from op_checks import generator, unit
+from op_checks import generator, on_threads, unit
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import sample_environment
 from splitnerf.ops import MeshScene
@@ -227,12 +227,8 @@ def test_equal_seeds_give_equal_bits_whatever_the_threads():
     surface, sky = textured(furnished_corner()), torch.from_numpy(sky_with_a_lamp())
     floor = torch.cat([torch.rand(40, 2, generator=generator()) * 1.8 - 0.9, torch.zeros(40, 1)], 1)
     points = flat_points(40) | {"positions": floor}
-    before, found = torch.get_num_threads(), []
-    for threads, seed in ((1, 7), (2, 7), (2, 8)):
-        torch.set_num_threads(threads)
-        found.append(incoming_light(surface, sky, **points, n_directions=32, seed=seed))
-    torch.set_num_threads(before)
-    one, two, other = found
+    drawn = lambda seed: incoming_light(surface, sky, **points, n_directions=32, seed=seed)
+    one, two, other = (on_threads(n, lambda: drawn(seed)) for n, seed in ((1, 7), (2, 7), (2, 8)))
     assert all(torch.equal(a, b) for a, b in zip(one, two))
     assert all(not torch.equal(a, b) for a, b in zip(one, other))
     assert not torch.equal(one.directions[0], one.directions[1])

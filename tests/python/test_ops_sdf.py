@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 from op_cases import BOX, STEP, bumpy_field, field_rays, full_cells, sampling_settings, sdf_field_inputs
-from op_checks import generator, grad_leaves, lib
+from op_checks import generator, grad_leaves, lib, on_threads
 from splitnerf.ops import march_rays, surface_weights
 from splitnerf.ops.rays import CELL_EMPTY
 from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_values
@@ -212,14 +212,7 @@ def test_field_reads_the_copy_of_the_table():
 
 
 def test_field_has_the_same_bits_on_any_number_of_threads():
-    inputs, kept = sdf_field_inputs(3000, torch.float32), torch.get_num_threads()
-    try:
-        found = []
-        for threads in (1, 2, 2):
-            torch.set_num_threads(threads)
-            outputs, grads = gradients(lib.sdf_field, inputs)
-            found.append([*outputs, *grads])
-    finally:
-        torch.set_num_threads(kept)
-    for others in found[1:]:
-        assert all(torch.equal(a, b) for a, b in zip(found[0], others))
+    inputs = sdf_field_inputs(3000, torch.float32)
+    first, *others = (on_threads(n, lambda: gradients(lib.sdf_field, inputs)) for n in (1, 2, 2))
+    for outputs, grads in others:
+        assert all(map(torch.equal, [*first[0], *first[1]], [*outputs, *grads]))

@@ -106,16 +106,6 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
     torch.testing.assert_close(shade_sums(normals, view_dirs, **material, sums=sums), there)
 
 
-def test_light_at_grazing_angles_alone_is_reflected_whole():
-    """All of the light where both Fresnel terms are 1: reflected by every material alike."""
-    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs()
-    light = sums[:, 0]
-    sums = LightSums(light, light, torch.zeros_like(light), light)
-    torch.testing.assert_close(
-        shade_sums(normals, view_dirs, albedo=albedo, roughness=roughness, metallic=metallic, sums=sums), light
-    )
-
-
 def test_a_sum_of_another_shape_is_named():
     x = sums_inputs()
     specular, grazing, diffuse, dielectric = x[5].unbind(1)

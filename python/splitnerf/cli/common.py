@@ -30,12 +30,6 @@ def examples(*lines: str, after: str = "") -> str:
     return "\n".join(([after, ""] if after else []) + [TITLE, *(f"  {line}" for line in lines)])
 
 
-def examples_in(epilog: str | None) -> list[str]:
-    """The command lines in the end of a command's help."""
-    _, _, lines = (epilog or "").partition(TITLE)
-    return [line.strip() for line in lines.splitlines() if line.strip()]
-
-
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line and name what was meant; options are not abbreviated, as a later one may begin
     with the same letters."""
