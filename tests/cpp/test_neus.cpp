@@ -34,32 +34,15 @@ template <class T> struct NeusEnds {
   NeusInterval<T> operator()(int64_t i) const { return {f_prev[i], f_next[i], f_prev[i] - f_next[i]}; }
 };
 
-template <class T> struct Ray {
-  std::vector<T> f_prev, f_next, weights;
-  T opacity;
-
-  NeusEnds<T> ends() const { return {f_prev.data(), f_next.data()}; }
-};
-
-// n samples of a ray along which the distance falls from f0 by `slope` in all.
-template <class T> Ray<T> falling_ray(double f0, double slope, int n, T s, T min_transmittance = 0) {
-  Ray<T> ray;
-  for (int i = 0; i < n; ++i) {
-    ray.f_prev.push_back(T(f0 - slope * i / n));
-    ray.f_next.push_back(T(f0 - slope * (i + 1) / n));
-  }
-  ray.weights.resize(n);
-  ray.opacity = neus_ray_weights(OneThread{}, ray.ends(), s, n, min_transmittance, ray.weights.data());
-  return ray;
-}
-
 TEST(Neus, NanReachesTheCaller) {
-  Ray<float> ray = falling_ray(0.1, 0.5, 10, 10.f);
-  ray.f_next[4] = std::numeric_limits<float>::quiet_NaN();
-  const float opacity = neus_ray_weights(OneThread{}, ray.ends(), 10.f, 10, 0.f, ray.weights.data());
+  std::vector<float> f_prev, f_next, weights(10);
+  for (int i = 0; i < 10; ++i) f_prev.push_back(0.1f - 0.05f * float(i)), f_next.push_back(0.05f - 0.05f * float(i));
+  f_next[4] = std::numeric_limits<float>::quiet_NaN();
+  const NeusEnds<float> ends{f_prev.data(), f_next.data()};
+  const float opacity = neus_ray_weights(OneThread{}, ends, 10.f, 10, 0.f, weights.data());
   EXPECT_TRUE(std::isnan(opacity));
-  EXPECT_FALSE(std::isnan(ray.weights[3]));
-  EXPECT_TRUE(std::isnan(ray.weights[4]));
+  EXPECT_FALSE(std::isnan(weights[3]));
+  EXPECT_TRUE(std::isnan(weights[4]));
 }
 
 }  // namespace
