@@ -97,9 +97,9 @@ def far_points(dtype: torch.dtype) -> tuple:
 
 
 def short_gradients(dtype: torch.dtype) -> tuple:
-    """Of lengths from 2e-4 to 1, on both sides of the least that has a direction."""
+    """Of lengths from 1e-5 to 1, on both sides of the least that has a direction."""
     gradients, *rest = field_gradients(dtype)
-    return gradients * torch.logspace(-3.3, -0.3, 40).to(dtype)[torch.arange(40) * 7 % 40][:, None], *rest
+    return gradients * torch.logspace(-5, -0.3, 40).to(dtype)[torch.arange(40) * 7 % 40][:, None], *rest
 
 
 def annealed(anneal: float, dtype: torch.dtype) -> tuple:

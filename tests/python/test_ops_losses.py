@@ -91,13 +91,6 @@ def test_normals_a_rounding_apart_know_in_which_direction():
     torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-3)
 
 
-def test_neighbours_without_a_direction_do_not_count():
-    gradients = torch.tensor([[0.0, 0, 1], [0, 0, 1e-5], [0, 1, 0], [0.6, 0, 0.8]])
-    pair, alone = torch.tensor([0, 1]), torch.tensor([1])
-    assert gradient_losses(gradients, torch.ones(2), pair)[1].item() == pytest.approx(math.sqrt(2), rel=1e-6)
-    assert gradient_losses(gradients, torch.ones(2), alone)[1].item() == 0.0
-
-
 def test_a_gradient_of_length_zero_has_a_finite_one():
     g = torch.zeros(3, 3, requires_grad=True)
     eikonal, smoothness = gradient_losses(g, torch.ones(1), torch.tensor([0, 0]))
