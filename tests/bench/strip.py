@@ -57,13 +57,13 @@ def square_around(alpha: np.ndarray) -> tuple[int, int, int]:
     return left, top, side
 
 
-def sheet(named: list[tuple[str, np.ndarray]], size: int) -> Image.Image:
+def sheet(named: list[tuple[str, np.ndarray]], size: int, columns: int = COLUMNS) -> Image.Image:
     """The pictures in rows, their names below."""
-    rows = -(-len(named) // COLUMNS)
-    result = Image.new("RGB", (COLUMNS * size, rows * (size + LABEL)), "white")
+    rows = -(-len(named) // columns)
+    result = Image.new("RGB", (columns * size, rows * (size + LABEL)), "white")
     draw, font = ImageDraw.Draw(result), ImageFont.load_default(size=20)
     for i, (name, picture) in enumerate(named):
-        left, top = i % COLUMNS * size, i // COLUMNS * (size + LABEL)
+        left, top = i % columns * size, i // columns * (size + LABEL)
         result.paste(Image.fromarray(to_uint8(picture)), (left, top))
         draw.text((left + size / 2, top + size), name, "black", font, anchor="ma")
     return result
