@@ -8,11 +8,12 @@ import pytest
 from looking_at import look_at, middle, needs_chromium, opened, pixels
 from looking_at import text as say
 from painted_ball import sky, with_textures
-from splitnerf.data.images import linear_to_srgb
+from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.export.writers import write_glb
 from splitnerf_tools.report import write_report
 
 RED, BLUE = (0.8, 0.2, 0.2), (0.2, 0.2, 0.7)
+FILES = "above.exr", "above.hdr"
 LAMP = (5, 12)  # row and column of a texel of the true light
 CHANNELS = ["shaded", "albedo", "roughness", "metallic", "normals", "occlusion"]
 LIGHT, INPUT = "document.querySelector('#object [name=light]')", "l.dispatchEvent(new Event('input', {bubbles: true}))"
@@ -46,6 +47,11 @@ def report(ball, tmp_path_factory):
     views = [{"name": f"r_{i}", "truth": plain(RED), "prediction": tilted} for i in range(2)]
     true = np.full((128, 256, 3), 0.5, np.float32)
     true[LAMP] = (64.0, 8.0, 1.0)
+    above = np.repeat(np.linspace(3, 0, 64, dtype=np.float32), 128 * 3).reshape(64, 128, 3)
+    for file, picture in {**dict.fromkeys(FILES, above), "square.exr": above[:, :64]}.items():
+        write_image(folder / file, picture)
+    (folder / "cut.exr").write_bytes((folder / "above.exr").read_bytes()[:900])
+    (folder / "notes.txt").write_text("no light")
     terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
     summary = {"Settings": {f"s{i}": i for i in range(30)}}
@@ -84,6 +90,10 @@ def seen(report):
 
     def point(selector, x, y, press=False):
         return {"do": "point", "selector": selector, "place": [x, y], "press": press}
+
+    def dropped(file):
+        path = {"do": "drop", "path": str(report.parent / file)}
+        return path, say(f"said of {file}", "document.querySelector('#object .hint + input + .hint').innerText")
 
     stage, object_ = "#views .stage", "#object canvas"
     true_light = "#light .widget figure:nth-child(2) canvas"
@@ -135,6 +145,10 @@ def seen(report):
         *maps,
         choose("shaded"),
         *(step for name in ("true light", "sunset") for step in (light(name), part(name, object_))),
+        *(step for file in FILES for step in (*dropped(file), part(file, object_))),
+        *(step for file in ("square.exr", "cut.exr", "notes.txt") for step in dropped(file)),
+        say("chosen", f"{LIGHT}.selectedOptions[0].text"),
+        part("kept", object_),
         light("true light"),
         {"do": "set", "selector": "#object [name=exposure]", "value": 2},
         part("brighter", object_),
@@ -213,6 +227,20 @@ def test_the_asset_turns_up_in_each_channel(seen):
     assert np.abs(pictures["true light"] - pictures["shaded"]).mean() > 0.01  # of the ball, on plain grey
     assert np.abs(pictures["sunset"] - pictures["true light"]).mean() > 0.02
     assert (middle(pictures["brighter"]) > middle(pictures["true light"]) + 0.1).all()
+
+
+def test_lights_of_the_readers_own_files_light_the_object(seen):
+    """One that is bright above lights the ball from above, from either kind of file."""
+    told, pictures = seen
+    for file in FILES:
+        height, width, _ = pictures[file].shape
+        column = pictures[file][:, width // 2, 0]
+        assert told["texts"][f"said of {file}"] == "" and column[height // 3] > column[height - height // 3] + 0.1
+    assert told["texts"]["chosen"] == "above.hdr" and np.abs(pictures["above.exr"] - pictures["above.hdr"]).max() < 0.02
+    assert np.array_equal(pictures["kept"], pictures["above.hdr"])
+    assert told["texts"]["said of square.exr"].endswith("is 64x64; an equirectangular map is twice as wide as high")
+    assert told["texts"]["said of cut.exr"].startswith("cut.exr: ")
+    assert told["texts"]["said of notes.txt"] == "notes.txt: is no .hdr or .exr file"
 
 
 def test_a_narrow_window_does_not_scroll_sideways(seen):

@@ -1,8 +1,10 @@
 // The asset in three dimensions, with the viewer's picture and controls.
 import { Controls } from "../view/controls.js";
+import { listenForFiles, opener } from "../view/drop.js";
 import { element, unpacked } from "../view/elements.js";
 import { asLight, halves } from "../view/halves.js";
 import { Viewer } from "../view/viewer.js";
+import { lightOf } from "./files.js";
 
 export async function object(section, { camera, lights, studio, name }) {
   const glb = document.getElementById("glb");
@@ -27,20 +29,33 @@ export async function object(section, { camera, lights, studio, name }) {
   const light = async (number) => {
     if (number === chosen) return;
     chosen = number;
-    const { width, height, packed } = all[number];
-    const content = await unpacked(packed);
+    const { width, height, packed, content } = all[number];
+    const texels = content ?? (await unpacked(packed));
     if (chosen !== number) return;
-    view.setLight(asLight(halves(content, width, height)));
+    view.setLight(asLight(halves(texels, width, height)));
     viewer.draw();
   };
   const changed = (values) => {
     viewer.set(values);
     light(Number(values.light));
   };
+  const said = element("p", { class: "hint" });
+  const opened = async (file) => {
+    try {
+      all.push(await lightOf(file));
+      controls.setLights(names(), all.length - 1);
+      controls.tell();
+      said.textContent = "";
+    } catch (error) {
+      said.textContent = error.message;
+    }
+  };
+  const names = () => all.map((one, i) => [i, one.name]);
   const hint = element("p", { class: "hint" }, "Drag to turn; click, then the wheel zooms and keys work.");
-  const controls = new Controls(panel, viewer, { changed, name, last: [hint] });
+  const controls = new Controls(panel, viewer, { changed, name, lights: [...opener(opened), said], last: [hint] });
   controls.listen(card);
-  controls.setLights(all.map((one, i) => [i, one.name]), 0);
+  controls.setLights(names(), 0);
+  listenForFiles(opened);
   controls.tell();
   await view.setAsset(await unpacked(glb.textContent));
   viewer.draw();

@@ -1,5 +1,6 @@
 // The panel of the viewer's page: the controls, and those that need its server: path tracing, files, and the photos' cameras.
 import { check, Controls, select } from "./controls.js";
+import { opener } from "./drop.js";
 import { element } from "./elements.js";
 
 const KEYS = {
@@ -14,15 +15,13 @@ const field = (id) => document.getElementById(id);
 
 export class Panel extends Controls {
   constructor(viewer, description, changed, opened) {
-    const file = element("input", { type: "file", accept: ".hdr,.exr", hidden: true, onchange: () => file.files.length && opened(file.files[0]) });
-    const open = element("button", { type: "button", onclick: () => file.click() }, "open one");
     const names = description.cameras.map((camera, i) => [i, camera.name]);
     const photos = element("fieldset", {}, check("cameras", "Cameras (click one)"), select("through", "Look through", [[-1, "none"], ...names]));
     const last = names.length ? [photos] : [];
     super(field("panel"), viewer, {
       changed, last, keys: KEYS, name: description.sources[0].name,
       first: [element("div", { class: "pair" }, check("final", "Final: path traced"), select("paths", "up to", PATHS), check("denoise", "Denoise", true))],
-      lights: [element("p", { class: "hint" }, "or drop an .hdr or .exr anywhere, or ", open), file],
+      lights: opener(opened),
     });
     this.form.elements.paths.value = 256;
     this.showLights(description.lights, description.first_light ?? undefined);
