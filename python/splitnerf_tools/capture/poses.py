@@ -49,7 +49,7 @@ FOCAL_RANGE = 0.3, 6.0  # focal lengths that are believed, in lengths of the pho
 ONE_LENS = 0.03  # most difference of two focal lengths of one lens, as a share
 OF_A_LENS = 20  # observations by which a further lens must be worth it
 # Pixels of reprojection and share of the photos without a camera from which on all cameras are doubted.
-SURE, LOST = 0.4, 0.05
+SURE, LOST = 0.3, 0.05
 TRIES = 2  # to find better ones
 GROUPINGS = 4  # of photos by lenses, at most, until the focal lengths that their points show agree with them
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
