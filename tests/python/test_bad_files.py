@@ -167,6 +167,11 @@ NERFSTUDIO = {
     "endless coefficient": (keys(k1=ENDLESS), "'k1' is no coefficient"),
     "f-theta lens": (keys(ftheta_p1=0.3), "'ftheta_p1' is not read"),
     "rolling shutter": (keys(rolling_shutter=[0, 0, 0.1]), "'rolling_shutter' is not read"),
+    "further coefficients": (keys(k1=0.1, k5=0.1), "'k5' is not read; undistort"),
+    "two poses of an image": (
+        meta(lambda m: m["frames"].append(m["frames"][5] | {"file_path": "images/v03.png"}), "transforms.json"),
+        "transforms.json: has two poses of v03.png; remove one",
+    ),
     "lens that folds": (keys(k1=-900.0), "its lens, undistorted, covers .% of the image"),
 }
 
@@ -306,7 +311,10 @@ MAPS = {
     "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
     "square": (floats(np.ones((8, 8, 3))), "a.exr: is 8x8; an equirectangular map is twice as wide as high"),
     "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
-    "PNG": (file("a.png", encode_png(np.ones((4, 8, 3)))), "a.png: .* must hold linear radiance"),
+    **{
+        name: (file(name, encode_png(np.ones((4, 8, 3)))), f"{name}: an environment map must hold linear radiance")
+        for name in ("a.png", "a.hdr", "a.exr")
+    },
     "none": (lambda root: root / "b.hdr", "no such environment map"),
 }
 
@@ -382,6 +390,12 @@ def endless_factor(g: Gltf) -> None:
     g.json["meshes"][0]["primitives"][0]["material"] = g.material(name="m", pbrMetallicRoughness=pbr)
 
 
+def of_second_buffer(g: Gltf) -> None:
+    """As a file of EXT_meshopt_compression whose fallback was left out."""
+    g.json["buffers"] = [{"byteLength": len(g.binary)}] * 2
+    g.json["bufferViews"][0]["buffer"] = 1
+
+
 def endless_zeros(g: Gltf) -> None:
     g.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
 
@@ -435,6 +449,7 @@ GLTF = {
     "another container": (rewritten("a.glb", lambda whole: b"glTX" + whole[4:]), "is neither a GLB nor glTF's JSON"),
     "nothing": (file("a.glb", b""), "is neither a GLB nor glTF's JSON"),
     "a list": (file("a.glb", b"[]"), "is JSON but not glTF"),
+    "second buffer of no file": (gltf(of_second_buffer), "buffer 1 has neither a file nor a binary chunk"),
     "deep JSON": (file("a.gltf", b"[" * 100_000), "a.gltf: is neither"),
     "no file": (lambda root: root / "b.glb", "b.glb: no such file"),
     "no buffer": (lambda root: beside(root, "gone%20too.bin"), "gone too.bin: no such file, though a.gltf refers"),

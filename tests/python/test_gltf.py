@@ -222,9 +222,15 @@ def test_repairs_are_said(path, capsys):
     ):
         assert text in said
     gltf = Gltf()
-    gltf.node(mesh=gltf.mesh(gltf.primitive(material=gltf.material(name="glass", alphaMode="BLEND"))))
+    clear = {"KHR_materials_transmission": {}}  # which the file does not declare
+    material = gltf.material(name="glass", alphaMode="BLEND", extensions=clear)
+    colours = gltf.accessor([[255, 0, 0, 255]] * 3, "uint8")  # not normalised
+    gltf.node(mesh=gltf.mesh(gltf.primitive(material=material, COLOR_0=colours)))
     read_asset(gltf.write(path))
-    assert "material 'glass' is transparent (alphaMode BLEND); drawn opaque" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "material 'glass' is transparent (alphaMode BLEND); drawn opaque" in said
+    assert "uses KHR_materials_transmission; left out" in said
+    assert "mesh 'part' has vertex colours outside [0, 1]; clipped" in said
 
 
 # ---- buffers in files of their own ----

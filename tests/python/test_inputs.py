@@ -156,12 +156,13 @@ def test_an_orientation_is_said(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("exposures", [(), (2.0,), (4.0, 0.5)])
-def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, exposures):
+def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, capsys, exposures):
     write_image(tmp_path / "x.hdr", np.full((8, 16, 3), 0.5, np.float32))
     whole = (tmp_path / "x.hdr").read_bytes()
-    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode()
+    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode() + b"GAMMA=2.2\n"
     (tmp_path / "x.hdr").write_bytes(whole.replace(b"FORMAT=", lines + b"FORMAT=", 1))
     assert read_radiance(tmp_path / "x.hdr") == pytest.approx(0.5 / np.prod(exposures), rel=0.01)
+    assert "the GAMMA of maps are not used (x.hdr)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("order", ["-Y 8 +X 16", "+Y 8 +X 16", "-Y 8 -X 16", "+Y 8 -X 16", "+X 8 -Y 16"])
@@ -181,9 +182,11 @@ def test_grey_photos_of_sixteen_bits_keep_their_values(tmp_path):
     png(np.full((4, 4), 30000, np.uint16)).save(tmp_path / "x.png")
     assert (read_upright(tmp_path / "x.png") == 30000).all()
     png(np.full((4, 4), 0.5, np.float32)).save(tmp_path / "f.tif")
-    with pytest.raises(InputError, match="f.tif: holds floats, whose white is unknown; save it in 8 or 16 bits"):
-        read_upright(tmp_path / "f.tif")
-    (tmp_path / "f.tif").unlink()
+    png(np.full((4, 4), 1 << 17, np.int32)).save(tmp_path / "i.tif")
+    for name in ("f.tif", "i.tif"):
+        with pytest.raises(InputError, match=f"{name}: holds values of 32 bits, whose white is unknown; save it in 8"):
+            read_upright(tmp_path / name)
+        (tmp_path / name).unlink()
     (tmp_path / "._x.png").write_bytes(b"a Mac's")
     assert len(find_photographs(tmp_path)) == 1
 
@@ -377,6 +380,20 @@ def test_keys_that_are_not_used_are_named(tmp_path, capsys):
     edit(tmp_path, lambda meta: meta["frames"][2].update(depth_file_path="d.png", rotation=0.1))
     load_dataset(tmp_path)
     assert "keys that are not used: aabb_scale, applied_scale, depth_file_path" in capsys.readouterr().err
+
+
+def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tmp_path, capsys):
+    make_blender(tmp_path, train=6, test=2)
+    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
+    edit(tmp_path, lambda meta: meta.update(fl_x=focal))
+    load_dataset(tmp_path)
+    assert "note" not in capsys.readouterr().err
+    edit(tmp_path, lambda meta: meta.update(fl_x=1.1 * focal))
+    write_image(tmp_path / "train/r_4.png", np.zeros((SIZE, SIZE, 4)))
+    load_dataset(tmp_path)
+    said = capsys.readouterr().err
+    assert "'fl_x' and 'camera_angle_x' contradict each other; 'fl_x' counts (r_0.png)" in said
+    assert "masks of 1 photos are empty; training takes the object to be nowhere in them (r_4.png)" in said
 
 
 def test_a_background_that_is_not_used_is_named(tmp_path, capsys):

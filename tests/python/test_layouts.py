@@ -162,7 +162,8 @@ def test_eval_modes_of_data_that_make_splits(tmp_path):
     assert names(root, "auto") == names(root, "filename") == (train, test)
     assert names(root, "all") == (train + test, train + test)
     assert names(root, "fraction") == ((train + test)[1:8], ["r_0", "r_2"])
-    edit(root, lambda m: m["frames"][1].update(file_path="./train/r_4"), "transforms_test.json")  # in both splits
+    shared = json.loads((root / "transforms_train.json").read_text())["frames"][4]
+    edit(root, lambda m: m["frames"].__setitem__(1, shared), "transforms_test.json")  # in both splits
     assert names(root, "all")[0] == [*train, "r_0", "r_2"]
 
 

@@ -58,6 +58,17 @@ def test_damaged_exif_costs_no_photo(tmp_path):
         assert read_upright(path).shape == (photo.height, photo.width, 3)
 
 
+def test_pictures_that_are_no_photos_are_told_of(tmp_path, capsys):
+    """And that a photo is HEIC whatever its name says."""
+    for name in ("a.avif", "b.png"):
+        Image.new("RGB", (4, 4)).save(tmp_path / name)
+    assert [photo.name for photo in find_photographs(tmp_path)] == ["b"]
+    assert "1 pictures of kinds that are not read are left out (a.avif)" in capsys.readouterr().err
+    (tmp_path / "c.jpg").write_bytes(b"\0\0\0\x18ftypheic")
+    with pytest.raises(InputError, match="c.jpg: .*(HEIC photos need|no photo)"):
+        find_photographs(tmp_path)
+
+
 @pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])
 def test_bad_photos_are_named(tmp_path, content, told):
     if content is not None:
@@ -108,6 +119,17 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     frames = sorted((tmp_path / "frames").iterdir())
     assert len(frames) == 3
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
+
+
+@pytest.mark.parametrize(("box", "is_told"), [(b"colrnclx\0\x09\0\x12", 1), (b"colrnclc\0\x01\0\x01", 0)])
+def test_a_video_of_high_range_is_told_of(tmp_path, capsys, box, is_told):
+    """As phones film by default, in hybrid log-gamma."""
+    writer = cv2.VideoWriter(str(tmp_path / "v.mp4"), cv2.VideoWriter_fourcc(*"mp4v"), 10, (320, 240))
+    writer.write(np.full((240, 320, 3), 20, np.uint8))
+    writer.release()
+    (tmp_path / "v.mp4").write_bytes((tmp_path / "v.mp4").read_bytes() + b"\0\0\0\x13" + box + b"\0\x09\0")
+    write_frames(tmp_path / "v.mp4", tmp_path, 1, lambda share: None)
+    assert ("v.mp4: is a video of high dynamic range" in capsys.readouterr().err) == is_told
 
 
 def test_a_video_that_is_cut_short_is_told_of(tmp_path, capsys):

@@ -460,7 +460,7 @@ def _check_once(frames: list[Frame]) -> None:
 
 
 def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
-    """Raises InputError where a photo has no mask though others have one, or no mask shows an object."""
+    """Raises InputError where a photo has no mask though others have one, or no mask shows an object; notes where one shows none."""
     for frame, photo in zip(frames, photos):
         if not photo.masked:
             has, cure = "no mask_path, as others have", "add a mask or remove it"
@@ -468,6 +468,9 @@ def _check_masks(frames: list[Frame], photos: list[Photo]) -> None:
                 has = "a mask that only says what to ignore (black)"
                 cure = "invert it if black is the object, else add one of it"
             raise InputError(f"{frame.image_path}: has no alpha channel and its frame {has}; {cure}")
-    if not any(photo.silhouette.any() for photo in photos):
-        folder = frames[0].image_path.parent
+    folder, empty = frames[0].image_path.parent, [f for f, photo in zip(frames, photos) if not photo.silhouette.any()]
+    if len(empty) == len(frames):
         raise InputError(f"{folder}: every mask is empty, no pixel is foreground; check alpha or mask_path")
+    if empty:
+        what = f"masks of {len(empty)} photos are empty; training takes the object to be nowhere in them"
+        note_once(f"{folder}: {what}", empty[0].image_path.name)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf import _core
-from splitnerf.data.images import HDR_SUFFIXES, area_average, read_image, read_radiance
+from splitnerf.data.images import HDR_SUFFIXES, area_average, read_header, read_image, read_radiance
 from splitnerf.errors import InputError, note
 
 ASPECT_TOLERANCE = 0.02
@@ -31,7 +31,7 @@ def read_environment(path: str | os.PathLike) -> np.ndarray:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such environment map; check the path")
-    if path.suffix.lower() not in HDR_SUFFIXES:
+    if path.suffix.lower() not in HDR_SUFFIXES or read_header(path).bits != 32:
         raise InputError(f"{path}: an environment map must hold linear radiance; use an .exr or .hdr file")
     radiance = read_radiance(path)
     height, width = radiance.shape[:2]

@@ -45,6 +45,7 @@ from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError, note_once
 
 SILHOUETTE_SIZE = 100  # pixels, about, along the shorter edge of what the object is found from
+ANGLES_ALIKE = 0.02  # difference of a photo's widths by an angle and by a focal length, as a share, that counts as none
 LEAST_COVERED = 0.25  # share of the undistorted image that the photo must cover
 CERTAIN = 0.999  # part of a pixel that must be known
 PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT lies below PEAK; 1 counts as clipped
@@ -190,10 +191,15 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bo
 def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> None:
     """Raises InputError where one lens is stated for photos of several sizes, and not for which: a focal length in pixels may be
     that of a camera that was turned, or of crops, an angle or a principal point of photos of one shape. Notes where a principal
-    point lies far from the middle, as of a lens that is stated for another size."""
+    point lies far from the middle, as of a lens that is stated for another size, or an angle contradicts a focal length."""
     first: dict[str, int] = {}
     for i, (frame, (height, width)) in enumerate(zip(frames, sizes)):
-        x, y = lens_intrinsics(frame.lens, (height, width))[2:]
+        fx, fy, x, y = lens_intrinsics(frame.lens, (height, width))
+        for axis, focal, extent in (("x", fx, width), ("y", fy, height)):
+            angle = frame.lens.get(f"camera_angle_{axis}", 2 * np.arctan(0.5 * extent / focal))
+            if abs(2 * focal * np.tan(0.5 * angle) - extent) > ANGLES_ALIKE * extent:
+                what = f"'fl_{axis}' and 'camera_angle_{axis}' contradict each other; 'fl_{axis}' counts"
+                note_once(f"{frame.image_path.parent}: {what}", frame.image_path.name)
         if not all(1 / 3 < share < 2 / 3 for share in (x / width, y / height)):
             what = f"({x:.0f}, {y:.0f}) in {width}x{height} pixels"
             note_once(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import mmap
 import os
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +21,9 @@ from splitnerf.files import atomic_path
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # silence: what cannot be read is told of by the program
 COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
+HEIC_BRANDS = (b"ftypheic", b"ftypheix", b"ftypmif1")
+OTHER = (".avif", ".gif", ".jp2", ".jxl", ".exr", ".hdr")
+HIGH_RANGE = rb"(?s)colrncl[cx]..\0[\x10\x12]"  # in an MP4: its curve is PQ or HLG, by the numbers of ITU-T H.273
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 WHOLE = 0.95  # share of the frames that a video states which a whole one has
@@ -65,6 +70,8 @@ def find_photographs(folder: Path) -> list[Photograph]:
         raise InputError(
             f"{folder}: holds no photos ({', '.join(COMMON + HEIC + RAW)}); give the folder with the photos"
         )
+    if others := sorted(path.name for path in folder.iterdir() if path.suffix.lower() in OTHER):
+        note_once(f"{folder}: {len(others)} pictures of kinds that are not read are left out", others[0])
     seen: dict[str, Path] = {}
     for path in paths:
         seen.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), path)
@@ -100,8 +107,8 @@ def read_upright(path: Path) -> np.ndarray:
         if image.has_transparency_data:
             note_once(f"{path.parent}: the alpha of photos is not used; give --masks if it is the object's", path.name)
         upright = image if turn is None else image.transpose(turn)
-        if upright.mode == "F":
-            raise InputError(f"{path}: holds floats, whose white is unknown; save it in 8 or 16 bits")
+        if upright.mode == "F" or (upright.mode == "I" and not 0 <= np.min(upright) <= np.max(upright) < 1 << 16):
+            raise InputError(f"{path}: holds values of 32 bits, whose white is unknown; save it in 8 or 16 bits")
         if upright.mode.startswith("I"):  # grey in 16 bits, which convert() would clip
             pixels = np.repeat(np.asarray(upright, np.uint16)[..., None], 3, axis=2)
         else:
@@ -141,6 +148,11 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
     total = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
     if not reader.isOpened() or total < 1:
         raise InputError(f"{video}: is no video that can be read; convert it to mp4, or give a folder of photos")
+    with open(video, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        if re.search(HIGH_RANGE, content):
+            note(
+                f"{video}: is a video of high dynamic range (HLG or PQ), and read as if it was sRGB; convert it to SDR"
+            )
     best, most, window = None, -1.0, 0
     for number in range(total + 1):
         read, frame = reader.read() if number < total else (False, None)
@@ -169,7 +181,9 @@ def write_png(path: Path, image: np.ndarray) -> None:
 
 
 def _open(path: Path) -> Image.Image:
-    if path.suffix.lower() in HEIC:
+    with open(path, "rb") as file:
+        brand = file.read(12)[4:]
+    if path.suffix.lower() in HEIC or brand in HEIC_BRANDS:
         try:
             import pillow_heif
         except ImportError:

@@ -141,7 +141,7 @@ class Document:
     def _buffer(self, index: int) -> bytes:
         if index not in self._buffers:
             buffer = self.json["buffers"][index]
-            data = self._resource(buffer["uri"]) if "uri" in buffer else self._binary
+            data = self._resource(buffer["uri"]) if "uri" in buffer else None if index else self._binary
             if data is None:
                 raise InputError(f"{self.path}: buffer {index} has neither a file nor a binary chunk; export it again")
             self._buffers[index] = data

@@ -196,6 +196,8 @@ def _read_part(document: Document, label: str, primitive: dict, placement: np.nd
         along = _unit(along - normals * (along * normals).sum(axis=1, keepdims=True))
         tangents = np.column_stack([along, np.where(arrays["TANGENT"][:, 3] < 0, -1.0, 1.0) * (-1) ** mirrored])
     colors = np.clip(arrays["COLOR_0"][:, :3], 0, 1) if "COLOR_0" in arrays else None
+    if colors is not None and (colors != arrays["COLOR_0"][:, :3]).any():
+        note_once(f"{label} has vertex colours outside [0, 1]; clipped")
     uv = {int(name[9:]): values[:, :2] for name, values in arrays.items() if name.startswith("TEXCOORD_")}
     return Part(vertices, triangles, normals, tangents, colors, uv, primitive.get("material"))
 

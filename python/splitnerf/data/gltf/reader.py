@@ -40,7 +40,7 @@ def _read(document: Document) -> Asset:
     foreign = set(document.get("extensionsRequired")) - SUPPORTED_EXTENSIONS
     if foreign:
         raise InputError(f"{path}: requires {', '.join(sorted(foreign))}, which is not read; export it without")
-    unread = set(document.get("extensionsUsed")) - SUPPORTED_EXTENSIONS
+    unread = {*document.get("extensionsUsed"), *_extensions(document.json)} - SUPPORTED_EXTENSIONS
     if unread:
         note(f"{path}: uses {', '.join(sorted(unread))}; left out")
     if document.get("animations"):
@@ -82,6 +82,13 @@ def _read(document: Document) -> Asset:
     if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
         raise InputError(f"{path}: no triangle has an area; export the mesh again")
     return asset
+
+
+def _extensions(value: object) -> set[str]:
+    """The names of the extensions in a part of the JSON, whether the file declares them or not."""
+    below = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    own = value.get("extensions") if isinstance(value, dict) else None
+    return set().union(own if isinstance(own, dict) else (), *map(_extensions, below))
 
 
 def _uv(path: Path, part: Part, material: Material, slots: TextureSlots) -> np.ndarray | None:

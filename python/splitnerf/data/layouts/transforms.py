@@ -42,7 +42,8 @@ FOCAL = ("camera_angle_x", "camera_angle_y", "fl_x", "fl_y")
 LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
 SMALLEST_EXPOSURE = 1e-4
 LARGEST_GAMMA = 5.0
-OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter")  # of instant-ngp
+# The first four: instant-ngp's; the others: of lenses with more coefficients, and of pixels that are skewed.
+OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter", "k5", "k6", "b1", "b2", "skew")
 # Keys that are used, or say nothing of pictures or cameras.
 OF_BOTH = {*FOCAL, *LENS, *OTHER_LENSES, "mask_kind", "gamma"}
 OF_FILE = OF_BOTH | {"frames", "train_filenames", "test_filenames", "val_filenames"}
@@ -81,7 +82,10 @@ def read(root: Path, split: str | None) -> list[Frame]:
         frames: dict[Path, Frame] = {}
         for path in own or [root / SINGLE]:
             for frame in _frames(path, None):
-                frames.setdefault(frame.image_path, frame)
+                if not np.allclose(
+                    frames.setdefault(frame.image_path, frame).pose, frame.pose, RIGID_TOLERANCE, RIGID_TOLERANCE
+                ):
+                    raise InputError(f"{path}: has two poses of {frame.image_path.name}; remove one")
         return list(frames.values())
     own = root / _own(split)
     if not own.is_file() and not (root / SINGLE).is_file():
