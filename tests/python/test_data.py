@@ -59,15 +59,18 @@ def test_view_folders(tmp_path):
     assert truth.albedo[centre, centre] == pytest.approx([128 / 255, 64 / 255, 1], abs=1e-4)  # linear
 
 
-def test_normals_of_shiny_blender_are_whole(scene):
+def test_normals_of_shiny_blender_are_whole(scene, capsys):
     """Those of NeRF-Blender, without `r_0_alpha.png`, have lost what is negative."""
     normal = np.array([-0.48, -0.6, 0.64])
     write_image(scene / "train/r_0_normal.png", np.full((SIZE, SIZE, 3), 0.5 * normal + 0.5))
+    load_view_truths(load_dataset(scene, "train"))
+    told = "have not the length 1; save them as normal.exr instead (r_0_normal.png)"
+    assert told in capsys.readouterr().err
     write_image(scene / "train/r_0_alpha.png", np.ones((SIZE, SIZE)))
     truth = load_view_truths(load_dataset(scene, "train"))[0]
     centre = SIZE // 2
     assert truth.normal[centre, centre] == pytest.approx(normal, abs=0.006)
-    assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0]
+    assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and told not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("downscale", [1, 5])

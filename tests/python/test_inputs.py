@@ -396,6 +396,17 @@ def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tm
     assert "masks of 1 photos are empty; training takes the object to be nowhere in them (r_4.png)" in said
 
 
+def test_an_alpha_that_was_multiplied_in_is_told_of(tmp_path, capsys):
+    make_blender(tmp_path, train=6, test=2)
+    y, x = np.mgrid[:SIZE, :SIZE] - SIZE / 2
+    alpha = np.clip((20 - np.hypot(x, y)) / 4, 0, 1)[..., None]
+    for colour, is_told in ((0.5, False), (0.5 * alpha, True)):
+        for path in (tmp_path / "train").iterdir():
+            write_image(path, np.dstack([colour * np.ones((SIZE, SIZE, 3)), alpha]))
+        load_dataset(tmp_path)
+        assert ("colours never exceed a faint alpha" in capsys.readouterr().err) == is_told
+
+
 def test_a_background_that_is_not_used_is_named(tmp_path, capsys):
     """Photos that their alpha has cut out show none; a file that is not there, or of another shape, is refused."""
     make_blender(tmp_path, train=6, test=2)

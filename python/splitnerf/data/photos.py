@@ -51,6 +51,7 @@ CERTAIN = 0.999  # part of a pixel that must be known
 PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT lies below PEAK; 1 counts as clipped
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
+FAINT, FEW = 0.25, 20  # alpha below which colours tell whether they are straight, and how many pixels tell nothing
 WHITE = 0.98  # least part of full scale that a mask should have somewhere
 
 MOST_LABELS = 32  # number and size of values up to which a mask of more than two of them may be one of labels
@@ -106,6 +107,11 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
     colour = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha, known = pixels[..., -1:] if channels in (2, 4) else None, None
     is_object = (mask_kind if frame.mask_kind == "auto" else frame.mask_kind) == "object"
+    if alpha is not None and pixels.dtype.kind == "u":
+        faint = (alpha[..., 0] > 0) & (alpha[..., 0] < FAINT * np.iinfo(alpha.dtype).max)
+        if faint.sum() > FEW and (colour[faint] <= alpha[faint]).all():
+            what = "colours never exceed a faint alpha, as where it was multiplied into them; save straight alpha"
+            note_once(f"{path.parent}: {what}", path.name)
     if frame.mask_path is not None and is_object:
         alpha = read_mask(frame.mask_path)
         if 0 < (brightest := float(decoded(alpha.max()))) < WHITE:

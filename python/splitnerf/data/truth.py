@@ -29,9 +29,9 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.images import HDR_SUFFIXES, area_average, read_header, read_image, srgb_to_linear
 from splitnerf.data.layouts import view_folders
 from splitnerf.data.pixels import averaged_codes, decoded
-from splitnerf.errors import InputError
+from splitnerf.errors import InputError, note_once
 
-OPAQUE = 0.9
+OPAQUE, LENGTHS_ALIKE = 0.9, 0.1
 MAPS = {"albedo.png": 4, "orm.png": 4, "normal.exr": 4, "normal.png": 3}  # and how many channels each needs
 PREFIX = "relight_"
 PROTOCOLS = {"low": (8, 20), "high": (7, 20)}
@@ -241,6 +241,10 @@ def _load_view(dataset: Dataset, view: int) -> ViewTruth:
     else:
         normals, known = decode_clipped_normals(encoded[..., :3])
         known &= alpha > OPAQUE
+        lengths = np.linalg.norm(srgb_to_linear(encoded[..., :3]), axis=2)[known & (encoded[..., :3] > 0).all(axis=2)]
+        if len(lengths) and np.mean(np.abs(lengths - 1) < LENGTHS_ALIKE) < 0.5:
+            what = "normals, read as clipped at 0 and in sRGB, have not the length 1; save them as normal.exr instead"
+            note_once(f"{image_path.parent}: {what}", _map_path(image_path, "normal.png").name)
         share = average(known.astype(np.float32))
         truth.normal, truth.normal_mask = _unit(average(normals * known[..., None]), share >= 0.5)
     return truth
