@@ -380,6 +380,12 @@ def test_keys_that_are_not_used_are_named(tmp_path, capsys):
     edit(tmp_path, lambda meta: meta["frames"][2].update(depth_file_path="d.png", rotation=0.1))
     load_dataset(tmp_path)
     assert "keys that are not used: aabb_scale, applied_scale, depth_file_path" in capsys.readouterr().err
+    edit(tmp_path, lambda meta: meta.update(k1=0.1, camera_type="orthographic"))
+    assert len(transforms.read_camera_path(tmp_path / "transforms_train.json")) == 6
+    said = capsys.readouterr().err
+    assert (
+        "has lenses that distort; drawn as pinholes" in said and "not used: aabb_scale, applied_scale, camera" in said
+    )
 
 
 def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tmp_path, capsys):

@@ -97,9 +97,14 @@ def read(root: Path, split: str | None) -> list[Frame]:
 
 def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
     """The cameras of a transforms file whose images need not exist, in its order: the pose [4, 4] float64 and the
-    pinhole, as in `Frame`. Raises InputError where the file has no frame, or one of them no usable pose or no lens."""
+    pinhole, as in `Frame`. Notes what the file says besides. Raises InputError where the file has no frame, or one of them no
+    usable pose or no lens."""
     meta, entries = read_entries(path)
-    return [_read_camera(entry, meta, i, path, f"frame {i}")[:2] for i, entry in enumerate(entries)]
+    _name_unused(meta, entries, path)
+    cameras = [_read_camera(entry, meta, i, path, f"frame {i}") for i, entry in enumerate(entries)]
+    if any(distortion for *_, distortion in cameras):
+        note_once(f"{path}: has lenses that distort; drawn as pinholes")
+    return [camera[:2] for camera in cameras]
 
 
 def _own(split: str) -> str:
