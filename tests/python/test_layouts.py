@@ -56,6 +56,15 @@ def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
     assert load_dataset(tmp_path).intrinsics[0, 0] == pytest.approx(2 * FOCAL)
 
 
+def test_of_two_forms_of_a_model_the_binary_one_is_read(tmp_path, capsys):
+    for binary, focal in ((False, 60.0), (True, 70.0)):
+        write_colmap(
+            tmp_path, binary=binary, cameras={1: (0, "SIMPLE_PINHOLE", [SIZE] * 2, [focal, SIZE / 2, SIZE / 2])}
+        )
+    assert load_dataset(tmp_path).intrinsics[0, 0] == 70
+    assert "sparse/0: has a model as text and as binary files; the binary ones are read" in capsys.readouterr().err
+
+
 def test_masks_of_colmap_are_found_by_both_names(tmp_path):
     root = write_colmap(tmp_path, binary=True, masks=True)
     for i in range(0, COUNT, 2):

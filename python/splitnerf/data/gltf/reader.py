@@ -84,11 +84,17 @@ def _read(document: Document) -> Asset:
     return asset
 
 
-def _extensions(value: object) -> set[str]:
-    """The names of the extensions in a part of the JSON, whether the file declares them or not."""
-    below = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    own = value.get("extensions") if isinstance(value, dict) else None
-    return set().union(own if isinstance(own, dict) else (), *map(_extensions, below))
+def _extensions(content: dict) -> set[str]:
+    """The names of the extensions that parts of a file have, whether it declares them or not."""
+    names, pending = set(), [content]
+    while pending:
+        value = pending.pop()
+        if isinstance(value, dict):
+            names |= {*value["extensions"]} if isinstance(value.get("extensions"), dict) else set()
+            pending += value.values()
+        elif isinstance(value, list):
+            pending += value
+    return names
 
 
 def _uv(path: Path, part: Part, material: Material, slots: TextureSlots) -> np.ndarray | None:

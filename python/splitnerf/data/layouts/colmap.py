@@ -94,6 +94,8 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
             for ending in ("txt", "bin"):  # binary files have all digits
                 files = folder / f"cameras.{ending}", folder / f"images.{ending}"
                 if all(map(is_file, files)):
+                    if folder in found:
+                        note_once(f"{folder}: has a model as text and as binary files; the binary ones are read")
                     found[folder] = files
     if not found:
         return None
