@@ -162,6 +162,7 @@ NERFSTUDIO = {
     "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
     "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),
     "decentred fisheye": (keys(camera_model="OPENCV_FISHEYE", p1=0.1), "a fisheye with 'p1' or 'p2' is not read"),
+    "fisheye in words": (keys(is_fisheye="true", k1=0.1), "'is_fisheye' must be true or false, got the text 'true'"),
     "coefficient in words": (keys(k1="strong"), "'k1' is no coefficient of a lens: the text 'strong'"),
     "coefficient NaN": (keys(k2=float("nan")), "'k2' is no coefficient of a lens: nan"),
     "endless coefficient": (keys(k1=ENDLESS), "'k1' is no coefficient"),

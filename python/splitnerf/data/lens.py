@@ -99,7 +99,9 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
         InputError: A number is out of bounds, the focal length is missing, or the camera model is not one of `MODELS`.
     """
     numbers = {key: value for key, value in numbers.items() if value is not None}
-    usual = "OPENCV_FISHEYE" if numbers.pop("is_fisheye", False) == 1 else "OPENCV"
+    if (is_fisheye := numbers.pop("is_fisheye", False)) not in (0, 1):
+        raise InputError(f"{where}: 'is_fisheye' must be true or false, got {shown(is_fisheye)}; repair it")
+    usual = "OPENCV_FISHEYE" if is_fisheye else "OPENCV"
     model = numbers.pop("camera_model", usual)
     if not isinstance(model, str) or model not in MODELS:
         raise InputError(
