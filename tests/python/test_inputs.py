@@ -159,10 +159,12 @@ def test_an_orientation_is_said(tmp_path, capsys):
 def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, capsys, exposures):
     write_image(tmp_path / "x.hdr", np.full((8, 16, 3), 0.5, np.float32))
     whole = (tmp_path / "x.hdr").read_bytes()
-    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode() + b"GAMMA=2.2\n"
+    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode() + (
+        b"GAMMA=2.2\n" if exposures else b"GAMMA=1\n"
+    )
     (tmp_path / "x.hdr").write_bytes(whole.replace(b"FORMAT=", lines + b"FORMAT=", 1))
     assert read_radiance(tmp_path / "x.hdr") == pytest.approx(0.5 / np.prod(exposures), rel=0.01)
-    assert "the GAMMA of maps are not used (x.hdr)" in capsys.readouterr().err
+    assert ("the GAMMA of maps are not used (x.hdr)" in capsys.readouterr().err) == bool(exposures)
 
 
 @pytest.mark.parametrize("order", ["-Y 8 +X 16", "+Y 8 +X 16", "-Y 8 -X 16", "+Y 8 -X 16", "+X 8 -Y 16"])

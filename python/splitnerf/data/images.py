@@ -301,7 +301,7 @@ def _radiance_head(path: Path, name: str) -> tuple[float, tuple[int, int]]:
         if key.strip() == b"EXPOSURE":
             with suppress(ValueError):
                 factor *= float(value)
-        elif key.strip() in (b"PRIMARIES", b"COLORCORR", b"GAMMA"):
+        elif key.strip() in (b"PRIMARIES", b"COLORCORR", b"GAMMA") and line.strip(b" .0") != b"GAMMA=1":
             note_once(f"{path.parent}: the {key.strip().decode()} of maps are not used", path.name)
     if not 1e-6 < factor < 1e6:
         note_once(f"{path.parent}: the EXPOSURE of maps is beyond reason and not used", path.name)
