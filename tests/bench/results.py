@@ -67,7 +67,7 @@ SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
 }
 STEPS_TAKE = {"paper": 300}  # minutes of the runs that steps end, on two cores
 ABLATED = "boombox", "corset"
-MOST_LINES = 20  # of a page's table; a longer one lists what runs deliver, and its CSV file has the rest
+MOST_LINES = 9  # of a page's table; a longer one lists what runs deliver, and its CSV file has the rest
 ABLATION = (
     *("--steps", 6000, "--downscale", 2, "--views", 6, "--spp", 32, "--rows"),
     "no refinement; MLP light; light by the split sum; no indirect light; no neutral light; no smoothness of normals; "
