@@ -292,6 +292,9 @@ def test_a_photo_shows_its_focal_length_through_another_lens():
 
 def test_focal_lengths_of_one_lens():
     assert _alike({1: 400.0, 2: 560.0, 3: 410.0, 4: 555.0, 5: 404.0}) == {1: 1, 5: 1, 3: 1, 4: 2, 2: 2}
+    unsure = {6: 375.0, 7: 600.0, 8: 700.0}  # by 7 % from the first lens, by 8 % from the second, and one of its own
+    lenses = _alike({1: 400.0, 2: 404.0, 3: 408.0, 4: 555.0, 5: 560.0, 9: 550.0} | unsure)
+    assert lenses == {1: 1, 2: 1, 3: 1, 6: 1, 4: 4, 5: 4, 9: 4, 7: 4, 8: 8}
 
 
 @pytest.mark.parametrize("damage", [b"", b"no database", b"SQLite format 3\0" + bytes(range(200)) * 30])

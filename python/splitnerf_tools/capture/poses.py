@@ -14,6 +14,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from statistics import median
 from urllib.parse import quote, unquote
 
 import numpy as np
@@ -46,10 +47,10 @@ LEAST_SEEN = 15  # points that a photo shows, with fewer of which its camera is 
 OUTLIER = 0.5  # pixels of reprojection from which on an observation counts less
 ADJUSTMENTS = 3
 FOCAL_RANGE = 0.3, 6.0  # focal lengths that are believed, in lengths of the photo's longer edge
-ONE_LENS = 0.03  # most difference of two focal lengths of one lens, as a share
+ONE_LENS, UNSURE = 0.03, 0.1  # most differences of focal lengths of one lens, as a share, see `_alike`
 OF_A_LENS = 20  # observations by which a further lens must be worth it
-# Pixels of reprojection and share of the photos without a camera from which on all cameras are doubted.
-SURE, LOST = 0.3, 0.05
+# Pixels of reprojection, those of few photos, and share of photos without a camera, from which on all cameras are doubted.
+SURE, SURE_OF_FEW, LOST = 0.4, 0.3, 0.05
 TRIES = 2  # to find better ones
 GROUPINGS = 4  # of photos by lenses, at most, until the focal lengths that their points show agree with them
 CENTRAL = 0.1  # distance of a principal point from the photo's middle that is believed, in the photo's width and height
@@ -279,19 +280,28 @@ def _focal_lengths(model: pycolmap.Reconstruction | None) -> dict[int, float]:
 
 
 def _alike(focal: dict[int, float]) -> dict[int, int]:
-    """For each photo the first one of those whose focal lengths lie together, by at most ONE_LENS from one to the next."""
+    """For each photo the first one of those with its lens: their focal lengths lie together, by at most ONE_LENS from one to the
+    next, or by UNSURE from the median of some, since a photo alone says it less surely."""
     groups = []
     for photo in sorted(focal, key=focal.get):
         if groups and focal[photo] < (1 + ONE_LENS) * focal[groups[-1][-1]]:
             groups[-1].append(photo)
         else:
             groups.append([photo])
+    lenses = {median([focal[photo] for photo in group]): group for group in groups if len(group) >= MIN_PHOTOS}
+    for group in [group for group in groups if len(group) < MIN_PHOTOS]:
+        own = median([focal[photo] for photo in group])
+        nearest = min(lenses, key=lambda length: abs(length - own), default=0.0)
+        if abs(nearest - own) < UNSURE * own:
+            lenses[nearest] += group
+            groups.remove(group)
     return {photo: min(group) for group in groups for photo in group}
 
 
 def _is_doubtful(model: pycolmap.Reconstruction, n: int) -> bool:
     """Whether cameras may be wrong: some of n photos have none, or they explain the features badly."""
-    return model.num_reg_images() < (1 - LOST) * n or model.compute_mean_reprojection_error() > SURE
+    sure = SURE if n > FEW else SURE_OF_FEW
+    return model.num_reg_images() < (1 - LOST) * n or model.compute_mean_reprojection_error() > sure
 
 
 def _are_possible(model: pycolmap.Reconstruction) -> bool:
