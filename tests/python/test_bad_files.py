@@ -397,24 +397,6 @@ def of_second_buffer(g: Gltf) -> None:
     g.json["bufferViews"][0]["buffer"] = 1
 
 
-def endless_zeros(g: Gltf) -> None:
-    g.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
-
-
-def one_vertex_for_all(g: Gltf) -> None:
-    g.json["accessors"][0]["count"] = 10**9
-    g.json["bufferViews"][0]["byteStride"] = 0
-
-
-def many_instances(g: Gltf) -> None:
-    """Of the largest mesh that the file's size allows."""
-    g.json["meshes"][0]["primitives"][0]["attributes"].pop("NORMAL")
-    g.json["accessors"][0] = {"componentType": 5126, "count": 3 * 10**5, "type": "VEC3"}
-    for _ in range(300):
-        g.node(mesh=0)
-
-
-UNPACKS = "unpacks to more than its size"
 GLTF = {
     "Draco": (content(extensionsRequired=["KHR_draco_mesh_compression"]), "requires KHR_draco_mesh_compression"),
     "extensions": (content(extensionsRequired=["KHR_texture_basisu", "EXT_a"]), "requires EXT_a, KHR_texture_basisu"),
@@ -440,9 +422,6 @@ GLTF = {
     ),
     "NaN factor": (gltf(endless_factor), "material 'm' has a factor that is no usable number"),
     "no image": (gltf(broken_image), "image 0 'bad': cannot be read as an image"),
-    "endless zeros": (gltf(endless_zeros), UNPACKS),
-    "one vertex for all": (gltf(one_vertex_for_all), f"{UNPACKS}|byteStride"),
-    "many instances": (gltf(many_instances), UNPACKS),
     "no stride": (gltf(lambda g: g.json["bufferViews"][0].update(byteStride=0)), "byteStride"),
     "half": (rewritten("a.glb", half), "truncated GLB"),
     "ten bytes": (rewritten("a.glb", lambda whole: whole[:10]), "truncated GLB"),

@@ -304,3 +304,28 @@ def test_a_long_name_is_shortened_in_a_message(path, capsys):
     read_asset(gltf.write(path))
     said = [line for line in capsys.readouterr().err.splitlines() if "xxx" in line]
     assert len(said) == 1 and len(said[0]) < 2100 and said[0].endswith("(alphaMode BLEND); drawn opaque")
+
+
+def endless_zeros(g: Gltf) -> None:
+    g.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
+
+
+def one_vertex_for_all(g: Gltf) -> None:
+    g.json["accessors"][0]["count"] = 10**9
+    g.json["bufferViews"][0]["byteStride"] = 0
+
+
+def many_instances(g: Gltf) -> None:
+    """Of the largest mesh that the file's size allows."""
+    g.json["accessors"][0] = {"componentType": 5126, "count": 3 * 10**5, "type": "VEC3"}
+    for _ in range(300):
+        g.node(mesh=0)
+
+
+@pytest.mark.parametrize("change", [endless_zeros, one_vertex_for_all, many_instances])
+def test_what_unpacks_to_more_than_its_size_is_refused(tmp_path, change):
+    scene = triangle()
+    change(scene)
+    scene.write(tmp_path / "a.glb")
+    with pytest.raises(InputError, match="unpacks to more than its size|byteStride"):
+        read_asset(tmp_path / "a.glb")
