@@ -1,5 +1,7 @@
 """The level of the light by what dielectrics reflect."""
 
+import math
+
 import pytest
 import torch
 from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light
@@ -36,6 +38,13 @@ def test_the_level_of_true_dielectrics_and_of_metals_alone_stays():
     assert level_of_light(torch.cat([dielectrics, METAL])) == 1.0
     assert level_of_light(METAL) == 1.0
     assert level_of_light(torch.cat([faint_metals(1.9)[:4], METAL])) == 1.0  # too few to tell
+
+
+def test_dark_metals_do_not_change_what_most_dielectrics_agree_on():
+    """Dielectrics have one F0, dark metals have many: their median is beyond all dielectrics', and tells nothing."""
+    dark = texture_values(torch.logspace(math.log10(0.06), math.log10(0.195), 400), torch.ones(400))
+    assert level_of_light(torch.cat([faint_metals(1.3), dark])) == pytest.approx(1.3, rel=1e-3)
+    assert level_of_light(torch.cat([dark, METAL.repeat(20, 1)])) == 1.0  # a third of all, and no tenth agrees
 
 
 def test_rough_surfaces_tell_nothing_and_keep_their_metallic():

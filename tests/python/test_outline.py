@@ -283,6 +283,15 @@ def test_a_sun_whose_glow_is_too_dim_gets_its_share(ball_over_plate):
     assert sun_to_sky(new) == pytest.approx(POWER.mean() / 0.3, rel=0.12)
 
 
+def test_a_lobe_that_mirrors_have_shown_has_its_lamp_in_its_middle(ball_over_plate):
+    """Shadows tell its width alone: its middle is known better than they tell it, and it need not have lost power."""
+    light = glowing_sky(6.0)
+    aside = unit(SUN + np.array([0.05, 0.03, 0.0]))  # 3 degrees off
+    new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, glowing_sky(6.0, aside)), light)
+    assert degrees_from(np.array(lamp.direction), SUN) < 0.3
+    assert lamp.radius < 4.0 and new.max() > 2 * light.max()
+
+
 def test_where_the_rest_of_the_light_is_known_the_sun_alone_gets_brighter(ball_over_plate):
     light = (0.5 * glowing_sky(12.0) + 0.15).astype(np.float32)  # half of the sun's power, under a true sky of 0.3
     asset = with_textures(ball_over_plate, albedo_texture=shaded_albedo(ball_over_plate, 0.3, light))

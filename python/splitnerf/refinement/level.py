@@ -2,8 +2,8 @@
 
 Photos fix the products of light and reflectance. Under a light that is too dark by a factor, each dielectric reflects more
 than the DIELECTRIC share that it must at normal incidence: training makes it a faint or a dark metal. No metal is that
-dark (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2), so the usual reflectance of what is no metal tells
-the factor. Only glossy surfaces tell it: the lobe of a rough metal looks like what clay scatters.
+dark (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2), so the reflectance on which most of what is no metal
+agrees tells the factor. Only glossy surfaces tell it: the lobe of a rough metal looks like what clay scatters.
 """
 
 from __future__ import annotations
@@ -14,20 +14,26 @@ from torch import Tensor
 DIELECTRIC = 0.04  # F0, reflectance at normal incidence
 DARKEST_METAL = 0.2  # F0 below which a texel is a dielectric, whatever its metallic says
 GLOSSY = 0.4  # roughness below which F0 is told from what is scattered
-LEAST_SHARE = 0.1  # of the texels that must be glossy dielectrics
+AGREE = 0.15  # difference of logarithms of F0 up to which texels agree: all dielectrics have one F0, dark metals many
+LEAST_SHARE = 0.1  # of all texels that must agree
 LEAST_FACTOR = 1.05  # below which the level stays
 
 
 def level_of_light(values: Tensor) -> float:
-    """The factor by which the light is too dark; 1 where it is not, or where too little is dielectric.
+    """The factor by which the light is too dark; 1 where it is not, or where too few texels agree on it.
 
     Args:
         values: [m, 8] texture values: albedo (3), roughness, metallic, normal (3).
     """
-    dielectrics = _reflectance(values)[_dielectric(values)]
-    if len(dielectrics) < LEAST_SHARE * len(values):
+    found = (_reflectance(values)[_dielectric(values)] / DIELECTRIC).log().sort().values
+    if len(found) == 0:
         return 1.0
-    factor = float(dielectrics.median()) / DIELECTRIC
+    first = torch.searchsorted(found, found - AGREE)
+    n_agreeing, middle = (torch.searchsorted(found, found + AGREE, right=True) - first).max(0)
+    if n_agreeing < LEAST_SHARE * len(values):
+        return 1.0
+    agreeing = found[first[middle] :][:n_agreeing]
+    factor = float(agreeing.median().exp())
     return factor if factor >= LEAST_FACTOR else 1.0
 
 
