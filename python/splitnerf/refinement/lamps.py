@@ -5,8 +5,9 @@ takes the edges of the sun's shadow. Light and albedo together then explain the 
 them. But the true albedo does not depend on shadows: of two close points, one in the shadow of a part of the lobe and
 one outside it, it is the same on average over many pairs. If the lobe stands for a compact lamp, the albedo outside the
 shadow is instead brighter by what the lamp adds there. So the lamp's direction, width and power are those that leave
-the smallest contrasts between such points. The light of the lobe is then made compact. The power of all light stays; but where photos
-show what else shines on the object, that stays, and the albedo takes the change.
+the smallest contrasts between such points. Where mirror images have shown the lamp, its direction is that of the lobe. The light of the
+lobe is then made compact. The power of all light stays; but where photos show what else shines on the object, that stays, and the albedo
+takes the change.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ MIN_ALBEDO = 0.05  # of the brighter one of a pair; darker dielectrics mirror mo
 LARGEST_CONTRAST = 1.5  # of log albedo; beyond it, it is the texture's
 NEAR = 0.15  # contrast from which on the cost grows slowly
 FARTHEST = 12.0  # degrees from the lobe's direction to the farthest lamp that is tried
-# A lobe with half its power within SHARP degrees was seen in mirror images: its middle is the lamp's. On 30 trained runs the middles of
-# such lobes were 0.1 to 1.6 degrees off, those of broader ones up to 9.
+# A lobe with half its power within SHARP degrees was seen in mirror images, smeared by training: a lamp is in its middle, and shadows tell
+# its width and power alone. On 30 trained runs the middles of such lobes were 0.1 to 1.6 degrees off, in one 2.9, those of broader ones up to 9.
 SHARP = 12.0
 N_TRIED, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
 RADII = (1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0)  # degrees
@@ -48,10 +49,9 @@ COARSE = 4
 # directions of the disc of FARTHEST degrees, and of all that lamps may fill; multiples of 32
 N_CENTRAL, N_TABLE = 32, 1792
 N_BEHIND, N_LOBE = 512, 256  # directions that stand for the other light and for the lobe; multiples of 32
-MIN_SIGMAS, MIN_SIGMAS_OF_SHARP = 5.0, 2.0  # by which a compact lamp must explain the pairs better
-# of the power of a lamp in the place of a lobe that is not sharp: training takes power from a lamp that it smears, since the albedo has its
-# shadow
-LEAST_FACTOR = 1.15
+# Of a lamp in the place of a lobe that is not sharp:
+MIN_SIGMAS = 5.0  # by which it must explain the pairs better
+LEAST_FACTOR = 1.15  # of its power: training takes power from a lamp that it smears, since the albedo has its shadow
 DARK = 0.02  # share of the mean light that counts as none
 
 
@@ -276,8 +276,7 @@ def compact_lamp(
         rest_is_known: Whether the level of the light beside the lobe is known.
 
     Returns:
-        The light, and what was found: None where the lobe stays as it is. Where a lobe is not sharp, it stays where the best lamp is
-        the broadest that is tried, or within FINER of FARTHEST: there may be a better one beyond. The largest power is taken.
+        The light, and what was found: None where the lobe stays as it is.
     """
     lobe = brightest_lobe(light)
     if not lobe.radiance.any():
@@ -287,28 +286,23 @@ def compact_lamp(
     if n_pairs < FEWEST:
         return light, None
     contrasts = Contrasts(points, light, lobe)
-    best = lamp_of_sharp(contrasts, lobe) if lobe.sharp else lamp_of_broad(contrasts, lobe)
+    best = best_lamp(contrasts, lobe.direction[None], RADII[:-1], FACTORS) if lobe.sharp else lamp_near(lobe, contrasts)
     if best is None:
-        return light, None
-    gain = contrasts.costs - contrasts.costs_left(contrasts.lamps(best.direction[None], best.radius), best.factor)[:, 0]
-    if not gain.mean() > (MIN_SIGMAS_OF_SHARP if lobe.sharp else MIN_SIGMAS) * gain.std() / np.sqrt(n_pairs):
         return light, None
     found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
     return with_lamp(light, lobe, found, rest_is_known), found
 
 
-def lamp_of_sharp(contrasts: Contrasts, lobe: Lobe) -> Trial:
-    """The best lamp in the middle of a lobe."""
-    return best_lamp(contrasts, lobe.direction[None], RADII[:-1], FACTORS)
-
-
-def lamp_of_broad(contrasts: Contrasts, lobe: Lobe) -> Trial | None:
-    """The best lamp near the middle of a lobe; None where a better one may be beyond those that are tried, or where training took no power
-    from it."""
+def lamp_near(lobe: Lobe, contrasts: Contrasts) -> Trial | None:
+    """The lamp that explains the pairs clearly better than a lobe does; None where a better one may be beyond those that are tried, and where
+    training took no power from it."""
     rough = best_lamp(contrasts, disc(lobe.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
     best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
     at_rim = best.radius == max(RADII) or degrees_from(best.direction, lobe.direction) > FARTHEST - FINER
-    return None if at_rim or best.factor < LEAST_FACTOR else best
+    lamp = contrasts.lamps(best.direction[None], best.radius)
+    gain = contrasts.costs - contrasts.costs_left(lamp, best.factor)[:, 0]
+    clear = gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(len(gain))
+    return best if clear and not at_rim and best.factor >= LEAST_FACTOR else None
 
 
 def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp, rest_is_known: bool) -> np.ndarray:
