@@ -142,11 +142,8 @@ def test_what_is_best_on_held_out_pixels_is_delivered(painted, monkeypatch, good
 def test_normals_that_explain_nothing_are_left_out(painted, true):
     """A relief that the photos show is kept; noise that they do not show is left out."""
     asset, data = painted
-    tilted = np.random.default_rng(0).normal(0, 0.01 if true else 0.2, asset.materials[0].normal_texture.shape) + [
-        0.3 * true,
-        0,
-        1,
-    ]
+    noise = np.random.default_rng(0).normal(0, 0.01 if true else 0.2, asset.materials[0].normal_texture.shape)
+    tilted = noise + [0.3 * true, 0, 1]
     tilted = np.float32(tilted / np.linalg.norm(tilted, axis=2, keepdims=True))
     tilted = with_textures(asset, normal_texture=tilted)
     stage = Stage(photos(tilted, sky(), spp=32) if true else data, tilted, sky(), SETTINGS)

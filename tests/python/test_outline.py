@@ -80,9 +80,8 @@ def test_a_piece_moves_as_its_edge_does_in_the_image(painted):
                     a, b = image(moved)[ends]
                     t = ((point - a) @ (b - a)) / ((b - a) @ (b - a))
                     offsets.append((a + t * (b - a) - point) @ outward)
-                assert by_axis[axis] == pytest.approx(
-                    (offsets[1] - offsets[0]) / 2e-4, abs=1e-3 * np.abs(pieces.moves).max()
-                )
+                slope = (offsets[1] - offsets[0]) / 2e-4
+                assert by_axis[axis] == pytest.approx(slope, abs=1e-3 * np.abs(pieces.moves).max())
 
 
 def test_what_is_behind_the_camera_or_beside_the_photo_has_no_outline(painted):
@@ -249,14 +248,12 @@ def test_the_brightest_lobe_is_the_one_of_most_power():
     assert (glow.radiance <= sky).all() and (glow.radiance >= 0).all()
 
 
-def test_a_disc_is_filled_evenly():
-    away = degrees_from(disc(SUN, 4.0, 2000), SUN)
-    assert away.max() < 4.01
-    assert np.mean(away < 2.0) == pytest.approx(0.25, abs=0.01)
+ASKEW = unit(SUN + np.array([0.05, 0.03, 0.0]))  # by 3 degrees
 
 
-def test_a_sun_is_found_by_its_shadow_in_the_albedo(ball_over_plate):
-    light = smeared_sun(unit(SUN + np.array([0.05, 0.03, 0.0])))  # 3 degrees off
+@pytest.mark.parametrize("kept", [0.7, 0.55])
+def test_a_sun_is_found_by_its_shadow_in_the_albedo(ball_over_plate, kept):
+    light = smeared_sun(ASKEW, kept)
     new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, light), light)
     assert degrees_from(np.array(lamp.direction), SUN) < 0.6 < degrees_from(brightest_lobe(light).direction, SUN)
     directions, areas = directions_of_texels(64)
@@ -276,18 +273,10 @@ def test_the_width_of_a_soft_sun_is_found(ball_over_plate):
     assert power[away < 10].sum() == pytest.approx(power[away < 20].sum(), rel=0.1)
 
 
-def test_a_sun_whose_glow_is_too_dim_gets_its_share(ball_over_plate):
-    light = smeared_sun(kept=0.55)
-    new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, light), light)
-    assert lamp.factor > 1.8
-    assert sun_to_sky(new) == pytest.approx(POWER.mean() / 0.3, rel=0.12)
-
-
 def test_a_lobe_that_mirrors_have_shown_has_its_lamp_in_its_middle(ball_over_plate):
     """Shadows tell its width alone: its middle is known better than they tell it, and it need not have lost power."""
     light = glowing_sky(6.0)
-    aside = unit(SUN + np.array([0.05, 0.03, 0.0]))  # 3 degrees off
-    new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, glowing_sky(6.0, aside)), light)
+    new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, glowing_sky(6.0, ASKEW)), light)
     assert degrees_from(np.array(lamp.direction), SUN) < 0.3
     assert lamp.radius < 4.0 and new.max() > 2 * light.max()
 
@@ -324,11 +313,8 @@ def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate,
 
 def test_metal_and_a_light_without_a_lamp_say_nothing(ball_over_plate):
     light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
-    metal = with_textures(
-        ball_over_plate,
-        albedo_texture=shaded_albedo(ball_over_plate, 0.3, light),
-        roughness_metallic_texture=np.ones((SIZE, SIZE, 2), np.float32),
-    )
+    albedo, ones = shaded_albedo(ball_over_plate, 0.3, light), np.ones((SIZE, SIZE, 2), np.float32)
+    metal = with_textures(ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=ones)
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
     assert compact_lamp(AssetTexels(ball_over_plate), flat, 3, 0) == (flat, None)
 

@@ -222,7 +222,6 @@ def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     assert values["found"][seen & (values["true"][:, 3] > 0.5), 3].mean() > 0.54  # 0.7 in truth, 0.5 at the start
     assert values["found"][seen, 4].mean() < 0.1  # no metal is invented
     assert sweeps[-1].error < 0.03 * sweeps[0].error
-    assert sweeps[-1].moved[0] < 0.3 * sweeps[0].moved[0]
     np.testing.assert_allclose(result.light, sky(), rtol=1e-5)
 
 

@@ -382,16 +382,13 @@ class Refinement:
         s = self.settings
         return max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
 
-    def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> tuple[float, list[float]]:
-        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step.
+    def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> float:
+        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error before it.
 
         Args:
             seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last
                 one.
             report: Called after each batch.
-
-        Returns:
-            The error, and the step's size by unknown.
         """
         s, surface, started = self.settings, self.surface(), time.monotonic()
         n_batches = self.batches_of_a_sweep()
@@ -422,7 +419,7 @@ class Refinement:
         self.n_sweeps += 1
         self.equations.move(step)
         self.step_seconds = time.monotonic() - gathered
-        return error, step.square().mean(0).sqrt().tolist()
+        return error
 
 
 class Draws:

@@ -242,16 +242,7 @@ def robust(contrast: np.ndarray) -> np.ndarray:
     return np.log1p(np.square(contrast / NEAR))
 
 
-class Trial(NamedTuple):
-    """A lamp that was tried: its mean cost, direction [3], radius in degrees and factor."""
-
-    cost: float
-    direction: np.ndarray
-    radius: float
-    factor: float
-
-
-def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...], factors: np.ndarray) -> Trial:
+def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...], factors: np.ndarray) -> CompactLamp:
     """The lamp that leaves the least contrasts, of all with middles [n, 3], radii in degrees and factors."""
     trials = []
     for radius in radii:
@@ -259,8 +250,9 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
         for factor in factors:
             costs = contrasts.costs_left(lamps, factor).mean(axis=0)
             best = int(np.argmin(costs))
-            trials.append(Trial(float(costs[best]), middles[best], radius, float(factor)))
-    return min(trials, key=lambda trial: trial.cost)
+            lamp = CompactLamp(middles[best].tolist(), radius, float(factor), len(contrasts.costs))
+            trials.append((float(costs[best]), lamp))
+    return min(trials, key=lambda trial: trial[0])[1]
 
 
 def compact_lamp(
@@ -282,25 +274,21 @@ def compact_lamp(
     if not lobe.radiance.any():
         return light, None
     points = at_edges(pairs_of(texels, APART * patch, seed), lobe, seed)
-    n_pairs = len(points.albedo) // 2
-    if n_pairs < FEWEST:
+    if len(points.albedo) < 2 * FEWEST:
         return light, None
     contrasts = Contrasts(points, light, lobe)
-    best = best_lamp(contrasts, lobe.direction[None], RADII[:-1], FACTORS) if lobe.sharp else lamp_near(lobe, contrasts)
-    if best is None:
-        return light, None
-    found = CompactLamp(best.direction.tolist(), best.radius, best.factor, n_pairs)
-    return with_lamp(light, lobe, found, rest_is_known), found
+    lamp = best_lamp(contrasts, lobe.direction[None], RADII[:-1], FACTORS) if lobe.sharp else lamp_near(lobe, contrasts)
+    return (light, None) if lamp is None else (with_lamp(light, lobe, lamp, rest_is_known), lamp)
 
 
-def lamp_near(lobe: Lobe, contrasts: Contrasts) -> Trial | None:
+def lamp_near(lobe: Lobe, contrasts: Contrasts) -> CompactLamp | None:
     """The lamp that explains the pairs clearly better than a lobe does; None where a better one may be beyond those that are tried, and where
     training took no power from it."""
     rough = best_lamp(contrasts, disc(lobe.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
-    best = best_lamp(contrasts, disc(rough.direction, FINER, N_FINER), (rough.radius,), FACTORS)
-    at_rim = best.radius == max(RADII) or degrees_from(best.direction, lobe.direction) > FARTHEST - FINER
-    lamp = contrasts.lamps(best.direction[None], best.radius)
-    gain = contrasts.costs - contrasts.costs_left(lamp, best.factor)[:, 0]
+    best = best_lamp(contrasts, disc(np.array(rough.direction), FINER, N_FINER), (rough.radius,), FACTORS)
+    at_rim = best.radius == max(RADII) or degrees_from(lobe.direction, np.array(best.direction)) > FARTHEST - FINER
+    left = contrasts.costs_left(contrasts.lamps(np.array([best.direction]), best.radius), best.factor)[:, 0]
+    gain = contrasts.costs - left
     clear = gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(len(gain))
     return best if clear and not at_rim and best.factor >= LEAST_FACTOR else None
 

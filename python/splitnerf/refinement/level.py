@@ -30,11 +30,8 @@ def level_of_light(values: Tensor) -> float:
         return 1.0
     first = torch.searchsorted(found, found - AGREE)
     n_agreeing, middle = (torch.searchsorted(found, found + AGREE, right=True) - first).max(0)
-    if n_agreeing < LEAST_SHARE * len(values):
-        return 1.0
-    agreeing = found[first[middle] :][:n_agreeing]
-    factor = float(agreeing.median().exp())
-    return factor if factor >= LEAST_FACTOR else 1.0
+    factor = float(found[first[middle] :][:n_agreeing].median().exp())
+    return factor if factor >= LEAST_FACTOR and n_agreeing >= LEAST_SHARE * len(values) else 1.0
 
 
 def at_level(values: Tensor, factor: float) -> Tensor:

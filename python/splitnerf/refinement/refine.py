@@ -31,7 +31,7 @@ from splitnerf.refinement.stage import Refined, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
-STATE, STATE_FORMAT = "refinement.pt", 6
+STATE, STATE_FORMAT = "refinement.pt", 7
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted

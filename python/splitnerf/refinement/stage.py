@@ -68,14 +68,12 @@ class Sweep(NamedTuple):
         seconds: Time since the start.
         error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of
             the brightest pixel around; it may come out slightly negative.
-        moved: [7] root mean square of the step, by unknown.
         held: Mean squared error of held-out pixels after it.
     """
 
     number: int
     seconds: float
     error: float
-    moved: list[float]
     held: float
 
 
@@ -229,7 +227,7 @@ class Stage:
             seconds = min(seconds, self.limit - started)
         seconds -= self.held_seconds
         message = self.message(len(self.sweeps) + 1)
-        error, moved = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
+        error = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
         number, fitted = len(self.sweeps) + 1, self.seconds
         self.last = self._candidate(number, self.fit.held_errors())
         self.held_seconds = self.seconds - fitted
@@ -237,7 +235,7 @@ class Stage:
         if held < np.mean(self.best.held):
             self.best = self.last
         self.last_seconds = self.seconds - started
-        self.sweeps.append(Sweep(number, self.seconds, error, moved, held))
+        self.sweeps.append(Sweep(number, self.seconds, error, held))
         return self.sweeps[-1]
 
     def message(self, step: int) -> str:

@@ -79,16 +79,12 @@ class AssetRenderer:
         Raises:
             ValueError: A map, a pose or a size cannot be used.
         """
-        fx, fy, cx, cy = (float(value) for value in intrinsics)
         return _core.render(
             self._scene,
             **self._surface,
             environment=_float32(environment),
             camera_to_world=_float32(pose[:3]),
-            fx=fx,
-            fy=fy,
-            cx=cx,
-            cy=cy,
+            **dict(zip(("fx", "fy", "cx", "cy"), map(float, intrinsics))),
             width=width,
             height=height,
             **self._options,
