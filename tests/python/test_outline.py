@@ -280,9 +280,7 @@ def test_a_lobe_that_mirrors_have_shown_has_its_lamp_in_its_middle(ball_over_pla
     assert degrees_from(np.array(lamp.direction), SUN) < 0.3
     assert lamp.radius < 4.0 and new.max() > 2 * light.max()
     dim = (0.6 * (light - 0.3) + 0.3).astype(np.float32)
-    blurred = (
-        shaded_albedo(ball_over_plate, 0.3, dim) ** 0.7
-    )  # contrasts as training's blur leaves them: the best lamp is 1.2
+    blurred = shaded_albedo(ball_over_plate, 0.3, dim) ** 0.7  # as by training: the best lamp has 1.2
     assert 1.3 < found(ball_over_plate, blurred, dim)[1].factor < 1 / 0.6
 
 
