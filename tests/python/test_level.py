@@ -4,7 +4,7 @@ import math
 
 import pytest
 import torch
-from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light
+from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light, rest_level
 
 
 def texture_values(albedo: torch.Tensor, metallic: torch.Tensor, rough: float = 0.3) -> torch.Tensor:
@@ -64,3 +64,16 @@ def test_surfaces_look_the_same_at_another_level():
     torch.testing.assert_close(moved[len(faint) :, :3] * factor, METAL[:, :3])
     assert (moved[:, [3, 5, 6, 7]] == torch.cat([faint, METAL])[:, [3, 5, 6, 7]]).all()
     assert level_of_light(moved) == 1.0
+
+
+def test_a_lamp_that_mirrors_have_shown_darkens_what_scatters_and_leaves_the_rest_of_the_light():
+    """Of a level that dielectrics ask for it explains the highlights: they become dielectrics, and metals stay."""
+    faint, clay, gain = faint_metals(1.4), texture_values(torch.full((30,), 0.5), torch.zeros(30), rough=0.8), 1.25
+    moved = at_level(torch.cat([faint, clay, METAL]), 1.4, gain)
+    assert rest_level(1.4, gain) == 1.0 and rest_level(1.4, 1.0) == 1.4
+    faint_now, clay_now, metal_now = moved.split([len(faint), len(clay), len(METAL)])
+    assert (faint_now[:, 4] == 0).all()
+    torch.testing.assert_close(radiances(faint_now, gain)[0], radiances(faint, 1.0)[0])
+    torch.testing.assert_close(clay_now[:, :3], clay[:, :3] / gain)
+    torch.testing.assert_close(metal_now[:, :3], METAL[:, :3] * (0.95 + 0.05 / gain))
+    assert torch.equal(at_level(faint, 1.0, gain)[:, 3:], faint[:, 3:])

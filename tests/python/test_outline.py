@@ -15,6 +15,7 @@ from splitnerf.refinement import outline
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.fit import FitSettings
 from splitnerf.refinement.lamps import (
+    CompactLamp,
     Points,
     brightest_lobe,
     compact_lamp,
@@ -23,6 +24,7 @@ from splitnerf.refinement.lamps import (
     parts_of_light,
     power_of,
     unit,
+    with_lamp,
 )
 from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
@@ -281,7 +283,26 @@ def test_a_lobe_that_mirrors_have_shown_has_its_lamp_in_its_middle(ball_over_pla
     assert lamp.radius < 4.0 and new.max() > 2 * light.max()
     dim = (0.6 * (light - 0.3) + 0.3).astype(np.float32)
     blurred = shaded_albedo(ball_over_plate, 0.3, dim) ** 0.7  # as by training: the best lamp has 1.2
-    assert 1.3 < found(ball_over_plate, blurred, dim)[1].factor < 1 / 0.6
+    new, lamp = found(ball_over_plate, blurred, dim)
+    assert 1.3 < lamp.factor < 1.6 / 0.6
+    away = degrees_from(directions_of_texels(64)[0], SUN) > 60
+    np.testing.assert_allclose(new[away].mean(1), 0.3, rtol=1e-3)  # the rest stays
+
+
+def test_light_beside_a_warm_lamp_becomes_as_blue_as_all_light_was_grey():
+    """Training finds a lamp's colour, and takes the rest for grey: made stronger, the lamp must not make all light yellow."""
+    warm, areas = glowing_sky(6.0) * np.float32([1.2, 1.0, 0.8]), directions_of_texels(64)[1]
+    lobe = brightest_lobe(warm)
+    grey = (lobe.radiance + 0.3 * np.float32([0.9, 1.0, 1.1])).astype(np.float32)
+    colour = lambda light: (light * areas[..., None]).sum((0, 1)) / power_of(light)
+    for sharp in (True, False):
+        new = with_lamp(grey, lobe._replace(sharp=sharp), CompactLamp(SUN.tolist(), 3.0, 1.8, 0), False)
+        np.testing.assert_allclose(colour(new), colour(grey), rtol=1e-3)
+        gain = 1.0 if not sharp else 1 + 0.8 * lobe.power.mean() / power_of(grey)
+        assert power_of(new) == pytest.approx(gain * power_of(grey), rel=1e-3)
+        assert new[0, 0, 2] / new[0, 0, 0] > 1.1 * grey[0, 0, 2] / grey[0, 0, 0]
+    strong = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 40.0, 0), False)
+    assert (strong > 0).all()  # however strong the lamp
 
 
 def test_where_the_rest_of_the_light_is_known_the_sun_alone_gets_brighter(ball_over_plate):
@@ -314,11 +335,15 @@ def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate,
     assert lamp is None and new is light
 
 
-def test_metal_and_a_light_without_a_lamp_say_nothing(ball_over_plate):
+def test_shadows_on_metal_and_in_a_light_without_a_lamp_say_nothing(ball_over_plate):
     light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
     albedo, ones = shaded_albedo(ball_over_plate, 0.3, light), np.ones((SIZE, SIZE, 2), np.float32)
     metal = with_textures(ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=ones)
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
+    mirrored = compact_lamp(AssetTexels(metal), glowing_sky(6.0), 3, 0)[
+        1
+    ]  # its middle is known, and what is usual must do
+    assert degrees_from(np.array(mirrored.direction), SUN) < 0.3 and mirrored.pairs == 0
     assert compact_lamp(AssetTexels(ball_over_plate), flat, 3, 0) == (flat, None)
 
 

@@ -30,7 +30,7 @@ from splitnerf.ops.shading import monte_carlo_light, shade_sums
 from splitnerf.ops.visibility import TexturedSurface, incoming_light
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp, power_of
-from splitnerf.refinement.level import at_level, level_of_light, under_lamp
+from splitnerf.refinement.level import at_level, level_of_light, rest_level
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
@@ -204,13 +204,12 @@ class Refinement:
         self.begin_at(1.0)
 
     def begin_at(self, level: float, lamp_gain: float = 1.0) -> None:
-        """Begins the fit with the asset as it was given, under its light made brighter by a factor `level`; what is no metal is
-        made darker by `lamp_gain` too, the factor of all light's power by a lamp that is set afterwards."""
-        (values, light), self.level, self.lamp_gain = self.trained, level, lamp_gain
-        self.texels.start = values if level == 1.0 else at_level(values, level)
-        if lamp_gain != 1.0:
-            self.texels.start = under_lamp(self.texels.start, lamp_gain)
-        self.light = EnvironmentLight(light * level)
+        """Begins the fit with the asset as it was given, seen under its light at a level that dielectrics ask for, and under a lamp that is set
+        afterwards and makes all light's power larger by a factor `lamp_gain`."""
+        (values, light), self.found, self.lamp_gain = self.trained, level, lamp_gain
+        self.level = rest_level(level, lamp_gain)
+        self.texels.start = values if level == lamp_gain == 1.0 else at_level(values, level, lamp_gain)
+        self.light = EnvironmentLight(light * self.level)
         self.light_equations = LightEquations(self.light, surroundings=self.seen)
         self.unknowns = to_unknowns(self.texels.start)
         self.equations = NormalEquations(self.unknowns, self.prior, KEEP)
@@ -235,14 +234,14 @@ class Refinement:
         light, known = self.light.radiance().numpy(), self.seen is not None
         changed, lamp = compact_lamp(self.texels, light, self.patch_width, self.settings.seed, rest_is_known=known)
         if lamp is not None:
-            self.begin_at(self.level, power_of(changed) / power_of(light) if known else 1.0)
-            self.light.set_radiance(torch.from_numpy(changed))
+            self.begin_at(self.found, power_of(changed) / power_of(light))
+            self.light.set_radiance(torch.from_numpy(changed * np.float32(self.level / self.found)))
         return lamp
 
     def state(self) -> dict[str, object]:
         """The state that further sweeps depend on, without the arguments, as tensors and plain values."""
         return {
-            "level": self.level,
+            "level": self.found,
             "lamp_gain": self.lamp_gain,
             "unknowns": self.unknowns,
             "curvature": self.equations.curvature,

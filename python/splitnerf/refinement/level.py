@@ -34,22 +34,23 @@ def level_of_light(values: Tensor) -> float:
     return factor if factor >= LEAST_FACTOR and n_agreeing >= LEAST_SHARE * len(values) else 1.0
 
 
-def at_level(values: Tensor, factor: float) -> Tensor:
-    """The texture values [m, 8] that look the same under a light brighter by a factor.
+def rest_level(level: float, lamp_gain: float) -> float:
+    """The factor on the light at a level that dielectrics ask for. A lamp that makes all its power larger by a factor of more than 1 stands in a
+    light that mirror images or photos have shown: that light stays, and dielectrics asked for the lamp, which makes highlights, too."""
+    return level if lamp_gain == 1.0 else 1.0
 
-    All become darker; what is glossy and reflects less than a metal becomes a dielectric.
+
+def at_level(values: Tensor, level: float, lamp_gain: float = 1.0) -> Tensor:
+    """The texture values [m, 8] that look the same under a light of that level, of which a lamp adds a factor `lamp_gain` of all power.
+
+    What scatters becomes darker by both, metals, which mirror the rest of the light, by the rest's level. Where a level was found, what is
+    glossy and reflects less than a metal becomes a dielectric.
     """
     albedo, metallic = values[:, :3], values[:, 4:5]
-    dielectric = _dielectric(values)[:, None]
-    scattered = torch.where(dielectric, albedo * (1 - metallic), albedo) / factor
-    metallic = torch.where(dielectric, 0.0, metallic)
-    return torch.cat([scattered, values[:, 3:4], metallic, values[:, 5:]], dim=1)
-
-
-def under_lamp(values: Tensor, factor: float) -> Tensor:
-    """The texture values [m, 8] with an albedo that is darker by a factor but for metals, which mirror the rest of the light too."""
-    albedo, metallic = values[:, :3], values[:, 4:5]
-    return torch.cat([albedo * (metallic + (1 - metallic) / factor), values[:, 3:]], dim=1)
+    faint = _dielectric(values)[:, None] if level > 1.0 else torch.zeros_like(metallic, dtype=torch.bool)
+    albedo = albedo * torch.where(faint, (1 - metallic) / lamp_gain, metallic + (1 - metallic) / lamp_gain)
+    metallic = torch.where(faint, 0.0, metallic)
+    return torch.cat([albedo / rest_level(level, lamp_gain), values[:, 3:4], metallic, values[:, 5:]], dim=1)
 
 
 def _reflectance(values: Tensor) -> Tensor:
