@@ -25,6 +25,9 @@ from splitnerf.ops.visibility import visibility_bits
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
 REACH = 30.0  # degrees from a lobe's middle to its end
+FADE = (
+    8.0  # width in degrees of the zone at its end in which it is not taken out of the light entirely: a cut would show
+)
 RING = 15.0  # width in degrees of the ring around it whose median is the light behind it
 # widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
 APART = 6
@@ -286,16 +289,19 @@ def compact_lamp(
     lamp = None
     if len(points.albedo) >= 2 * FEWEST:
         contrasts = Contrasts(points, light, lobe)
-        lamp = lamp_amid(lobe, contrasts) if lobe.sharp else lamp_near(lobe, contrasts)
+        if rest_is_known or not lobe.sharp:  # that photos show the sky around a sun makes its lobe sharp, too
+            lamp = lamp_near(lobe, contrasts)
+        if lobe.sharp and (lamp or not rest_is_known):
+            lamp = usual_lamp(lamp.direction if lamp else lobe.direction.tolist(), contrasts)
     elif lobe.sharp:
         lamp = CompactLamp(lobe.direction.tolist(), USUAL_RADIUS, USUAL_FACTOR, 0)
     return (light, None) if lamp is None else (with_lamp(light, lobe, lamp, rest_is_known), lamp)
 
 
-def lamp_amid(lobe: Lobe, contrasts: Contrasts) -> CompactLamp:
-    """The lamp in the middle of a lobe whose width and power are both usual and explain the pairs."""
+def usual_lamp(direction: list[float], contrasts: Contrasts) -> CompactLamp:
+    """The lamp in a direction that explains the pairs and is usual in its power."""
     lamps = [
-        CompactLamp(lobe.direction.tolist(), radius, factor, len(contrasts.costs))
+        CompactLamp(direction, radius, factor, len(contrasts.costs))
         for radius in RADII[:-1]
         for factor in FACTORS.tolist()
     ]
@@ -326,10 +332,11 @@ def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp, rest_is_known: b
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
     inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())
-    changed, added = light - lobe.radiance, lamp.factor * lobe.power
+    fade = np.clip((REACH - degrees_from(directions, lobe.direction)) / FADE, 0, 1)[..., None]
+    changed, added = light - lobe.radiance * fade, lamp.factor * lobe.power
     if not rest_is_known:
         before = (light * areas[..., None]).sum(axis=(0, 1))
-        behind = before - lobe.power
+        behind = (changed * areas[..., None]).sum(axis=(0, 1))
         gain = (behind + added).mean() / before.mean()
         changed *= np.clip((gain * before - added) / np.maximum(behind, 1e-20), 1 / MOST_TINT, MOST_TINT)
     changed[inside] += added / areas[inside].sum()
