@@ -107,6 +107,7 @@ def drawn_inputs(n: int = 5, k: int = 6, dtype=torch.float64, seed: int = 0) -> 
     roughness = 0.2 + 0.7 * torch.rand(n, 1, generator=g, dtype=dtype)
     directions = unit(normals[:, None] + torch.randn(n, k, 3, generator=g, dtype=dtype))  # some from below
     pdf = 0.1 + torch.rand(n, k, generator=g, dtype=dtype)
+    normals[1::4] *= -1  # which face away from the viewer
     return normals, view_dirs, roughness, directions, pdf, torch.rand(n, k, 3, generator=g, dtype=dtype)
 
 

@@ -13,6 +13,7 @@ def sums_inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
 
     normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
     view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
+    normals[1::4] *= -1  # which face away from the viewer
     sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0), rand(3, 0.02, 0.5)]
     return normals, view_dirs, rand(3, 0.05, 0.9), rand(1, 0.1, 0.9), rand(1, 0.1, 0.9), torch.stack(sums, 1)
 

@@ -27,6 +27,22 @@ def test_vertices_out_of_reach_are_refused(value):
         MeshScene(vertices, np.array([[0, 1, 2]]))
 
 
+@pytest.mark.parametrize(
+    ("n_vertices", "columns", "faces"),
+    [
+        (3, 3, [[1, 2, 3]]),
+        (3, 3, [[-1, 0, 1]]),
+        (3, 3, [[1 << 32, 1, 2]]),
+        (3, 3, []),
+        (0, 3, [[0, 1, 2]]),
+        (3, 2, [[0, 1, 2]]),
+    ],
+)
+def test_meshes_that_are_none_are_refused(n_vertices, columns, faces):
+    with pytest.raises(ValueError):
+        MeshScene(np.eye(3, dtype=np.float32)[:n_vertices, :columns], np.reshape(faces, (-1, 3)).astype(np.int64))
+
+
 @pytest.mark.parametrize("value", BAD)
 @pytest.mark.parametrize("which", ["origin", "direction"])
 def test_rays_that_are_none_meet_nothing_and_their_neighbours_what_they_met(ball, value, which):
@@ -40,10 +56,12 @@ def test_rays_that_are_none_meet_nothing_and_their_neighbours_what_they_met(ball
     assert np.array_equal(triangles < 0, bad.numpy())
 
 
-@pytest.mark.parametrize(
-    ("t_far", "meets"), [(math.nan, False), (-1.0, False), (-math.inf, False), (math.inf, True), (3e38, True)]
-)
-def test_lengths_that_are_none_meet_nothing(ball, t_far, meets):
+LENGTHS = {math.nan: False, -1.0: False, -math.inf: False, math.inf: True, 3e38: True, 1.9: False, 2.1: True}
+
+
+@pytest.mark.parametrize(("t_far", "meets"), LENGTHS.items())
+def test_rays_end_at_their_length_and_lengths_that_are_none_meet_nothing(ball, t_far, meets):
+    """The ball begins at 2."""
     assert bool(ball.is_open(ABOVE[None], DOWN[None], t_far)) != meets
 
 

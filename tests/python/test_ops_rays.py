@@ -1,11 +1,11 @@
-"""surface_weights, spread_samples, interpolate and composite."""
+"""surface_weights, spread_samples, interpolate and composite; draw_rays out of range, of which the rest is in stability/properties.py."""
 
 import pytest
 import torch
 from op_checks import check_error, generator, lib
 from ray_inputs import packed_samples, surface_inputs
 from splitnerf.ops import composite, surface_weights
-from splitnerf.ops.rays import PackedSamples, spread_samples
+from splitnerf.ops.rays import PackedSamples, PixelList, draw_rays, spread_samples
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -144,3 +144,17 @@ def test_interpolation_is_exact_for_what_is_linear_along_a_ray():
     assert (rays[spread.shaded[spread.first]] == rays).all() and (rays[spread.shaded[spread.second]] == rays).all()
     shares = spread.gather(weights)
     torch.testing.assert_close(shares @ values[spread.shaded], weights @ got)
+
+
+def test_numbers_that_are_out_of_range_stay_within_the_photos():
+    """Of two photos of 4 rows and 5 columns: of a list that names pixels which are not there, and of random numbers that are
+    none."""
+    cameras, every = (torch.eye(3).repeat(2, 1, 1), torch.zeros(2, 3)), PixelList.all(2 * 4 * 5, torch.device("cpu"))
+    runs = PixelList(torch.tensor([2, 3, 7]), torch.tensor([1, 5, 30]), 7)  # pixels 1 2, 7, 33 34 35 36
+    beyond = PixelList(torch.tensor([3]), torch.tensor([1000]), 3)
+    for random, n_near, near, pixels in (
+        ([0.5, 0.5], 2, beyond, [39, 39]),
+        ([-3.0, 2.0], 0, runs, [0, 39]),
+        ([-3.0, 2.0], 2, runs, [1, 36]),
+    ):
+        assert draw_rays(torch.tensor(random), n_near, near, every, *cameras, 4, 5)[3].tolist() == pixels

@@ -4,7 +4,7 @@ import math
 
 import pytest
 import torch
-from op_cases import drawn_inputs, shared_inputs
+from op_cases import shared_inputs
 from op_checks import check_error, lib, unit
 from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
 from splitnerf.ops import light_queries, shading, split_sum_shade
@@ -75,35 +75,6 @@ def test_a_white_sky_gives_the_brdf_table(n_dot_v, roughness):
     assert sums.grazing[0].tolist() == pytest.approx([f2] * 3, abs=3e-3)
     assert sums.diffuse[0].tolist() == pytest.approx([1.0] * 3, abs=1e-3)
     assert sums.dielectric[0].tolist() == pytest.approx([layer] * 3, abs=1e-3)
-
-
-def test_a_normal_that_faces_away_is_turned():
-    normals, view_dirs, roughness, directions, pdf, radiance = drawn_inputs()
-    flipped = monte_carlo_light(-normals, view_dirs, roughness, directions, pdf, radiance)
-    for a, b in zip(flipped, monte_carlo_light(normals, view_dirs, roughness, directions, pdf, radiance)):
-        torch.testing.assert_close(a, b)
-
-
-@pytest.mark.parametrize("compensate", [False, True])
-@pytest.mark.parametrize("turned", [1.0, -1.0])
-def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
-    """Where the light is L over the specular lobe, the sums are (F1 + F2) L, F2 L and E_d L."""
-    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs(200)
-    light, _, diffuse, _ = sums.unbind(1)
-    normals = turned * normals
-    one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
-    metal = torch.ones_like(metallic)
-
-    def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
-        point = normals, view_dirs
-        return split_sum_shade(
-            *point, albedo=albedo, roughness=roughness, metallic=metallic, specular=one, diffuse=black
-        )
-
-    sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
-    material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": compensate}
-    there = split_sum_shade(normals, view_dirs, **material, specular=light, diffuse=diffuse)
-    torch.testing.assert_close(shade_sums(normals, view_dirs, **material, sums=sums), there)
 
 
 def test_a_sum_of_another_shape_is_named():
