@@ -56,7 +56,7 @@ TESTS = {
     "training/exposure.py": "test_exposures.py",
     "training/start.py": "test_start.py",
     "training/loop.py": "test_refreshes.py test_schedule.py test_finite.py",
-    "training/losses.py": "test_light_loss.py test_loss_terms.py test_physics.py test_shading_model.py test_scene.py",
+    "training/losses.py": "test_light_loss.py test_loss_terms.py test_shading_model.py test_scene.py",
     "training/meshes.py": "test_meshes.py",
     "progress.py": "test_progress.py",
     "training/schedule.py": "test_schedule.py",

@@ -10,6 +10,7 @@ from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
 from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
 from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table, score_of
+from test_train import flat
 from tiny_runs import SMALL, as_options, refused
 
 
@@ -28,15 +29,6 @@ def test_every_row_is_possible(name, n_rows):
     assert len(names) == len(rows) == n_rows
     assert all(row.reference in names and row.reference != row.name for row in rows[1:])
     assert REFERENCES.keys() <= (PAPER | SWITCHES).keys()
-
-
-def flat(settings: dict, prefix: str = "") -> dict[str, object]:
-    """Settings by their path, of nested tables too."""
-    return {
-        path: value
-        for key, entry in settings.items()
-        for path, value in (flat(entry, f"{key}.") if isinstance(entry, dict) else {prefix + key: entry}).items()
-    }
 
 
 @pytest.mark.parametrize("name", PAPER)

@@ -1,4 +1,4 @@
-"""The light's consistency loss by lights whose integrals are known, and what the other terms draw and see."""
+"""The light's consistency loss by lights whose integrals are known, and the other terms: closed forms, what they draw and see."""
 
 import math
 from types import SimpleNamespace
@@ -10,10 +10,16 @@ from op_checks import generator
 from splitnerf.data.environment import seen_at
 from splitnerf.fields import LightPyramid
 from splitnerf.training import losses
-from test_physics import rays
 from tiny_runs import tiny
 
 LOOSE = {"light_lobe_below": 0.0, "constants.light_form": "square"}
+
+
+def rays(weights: list[float], metallic: list[float]) -> SimpleNamespace:
+    """Grey samples of these weights."""
+    n, metallic = len(weights), torch.tensor(metallic)[:, None]
+    points = SimpleNamespace(metallic=metallic, albedo=torch.full((n, 3), 0.4), roughness=torch.full((n, 1), 0.5))
+    return SimpleNamespace(shares=torch.tensor(weights), shaded=torch.arange(n), points=points)
 
 
 class Slope:
@@ -100,55 +106,39 @@ def test_the_gradient_is_that_of_the_weighted_sum():
 
 def test_shares_that_are_not_finite_do_not_stop_the_draw_of_materials():
     ray = rays([1.0, float("nan")], [0.0, 1.0])
-    ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
     assert losses.material_entropy_loss(ray, tiny(), generator()).item() == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("channels", [1, 3])
-def test_occlusion_is_traced_for_its_share_as_it_is_set(monkeypatch, channels):
-    """A fifth of the samples, off the surface by the offset, by the step's seed; all off by 0.1 and 0.3 cost 0.1 in each channel."""
-    asked, n = {}, 2000
-
-    def factors(scene, positions, normals, *, lobe_dirs, roughness, environment, **kwargs):
-        asked.update(n=len(positions), **kwargs)
-        return torch.full((len(positions), channels), 0.5), torch.full((len(positions), channels), 0.5)
-
-    monkeypatch.setattr(losses, "occlusion_factors", factors)
-    ray = rays([1.0] * n, [0.0] * n)
-    ray.positions = ray.normals = torch.zeros(n, 3)
-    ray.sdf, ray.points.roughness = torch.zeros(n), torch.ones(n, 1)
-    ray.points.occlusion_d, ray.points.occlusion_s = torch.full((n, channels), 0.6), torch.full((n, channels), 0.2)
-    config = tiny(occlusion_share=0.2, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5)
-    loss = losses.occlusion_loss(ray, None, None, config, generator(), 9)
-    assert loss.item() == pytest.approx(0.1, rel=1e-4) and asked.pop("n") == pytest.approx(0.2 * n, rel=0.15)
-    assert asked == dict(n_diffuse_rays=5, n_specular_rays=5, offset=0.037, seed=9, n_channels=channels)
-
-
-def occlusion_rays(n: int) -> SimpleNamespace:
+def occlusion_rays(n: int, channels: int = 1) -> SimpleNamespace:
     """Samples whose number stands in all that belongs to them; factors are off 0.5 by 0.002 and -0.004 of it."""
     number = torch.arange(float(n))
     column = number[:, None]
-    points = SimpleNamespace(roughness=column, occlusion_d=0.5 + 0.002 * column, occlusion_s=0.5 - 0.004 * column)
+    points = SimpleNamespace(roughness=column)
+    points.occlusion_d, points.occlusion_s = ((0.5 + x * column).expand(-1, channels) for x in (0.002, -0.004))
     normals, sdf = column + torch.tensor([0.0, 0.5, 0.0]), torch.full((n,), 0.5)
     rest = {"shaded": torch.arange(n), "shares": 1.0 + number, "positions": column.expand(-1, 3)}
     return SimpleNamespace(**rest, sdf=sdf, normals=normals, points=points)
 
 
-def test_what_belongs_to_a_chosen_sample_stays_together(monkeypatch):
-    """About 60 of 200, drawn by the run's own generator: w (0.002^2 + 0.004^2) i^2 over the sum of w."""
+@pytest.mark.parametrize("channels", [1, 3])
+def test_occlusion_is_traced_as_it_is_set_and_what_belongs_to_a_sample_stays_together(monkeypatch, channels):
+    """About 60 of 200, off the surface by the offset, by the step's seed, drawn by the run's own generator:
+    w (0.002^2 + 0.004^2) i^2 over the sum of w, the mean over channels."""
     asked = []
 
-    def factors(scene, positions, normals, lobe_dirs, roughness, environment, **_):
-        asked.append((positions, normals, lobe_dirs, roughness[:, 0]))
-        return torch.full((len(positions), 1), 0.5), torch.full((len(positions), 1), 0.5)
+    def factors(scene, positions, normals, *, lobe_dirs, roughness, environment, **given):
+        asked.append((positions, normals, lobe_dirs, roughness[:, 0], given))
+        return (torch.full((len(positions), channels), 0.5),) * 2
 
     monkeypatch.setattr(losses, "occlusion_factors", factors)
-    config = tiny(occlusion_share=0.3, occlusion_channels=1)
+    config = tiny(occlusion_share=0.3, occlusion_channels=channels, occlusion_offset=0.037, occlusion_rays=5)
     found = []
     for seed in range(2):
         torch.manual_seed(seed)
-        found.append(losses.occlusion_loss(occlusion_rays(200), None, None, config, generator(), 0).item())
-    positions, normals, lobes, number = asked[0]
+        ray = occlusion_rays(200, channels)
+        found.append(losses.occlusion_loss(ray, None, None, config, generator(), 9).item())
+    positions, normals, lobes, number, given = asked[0]
+    assert given == dict(n_diffuse_rays=5, n_specular_rays=5, offset=0.037, seed=9, n_channels=channels)
     assert 30 < len(number) < 90 and number.unique().equal(number)
     on_ray = positions + 0.5 * normals
     for part, own in ((on_ray, [0.0, 0.0, 0.0]), (normals, [0.0, 0.5, 0.0]), (lobes, [0.0, 0.5, 0.0])):
@@ -199,7 +189,6 @@ def test_similar_materials_attract_each_other():
     attraction = 0.5 * math.exp(-0.25) / (1 + math.exp(-0.25))
     for name, values in (("roughness", [[0.4], [0.6]]), ("metallic", [[0.4], [0.6]]), ("albedo", [[0.29], [0.39]])):
         ray = rays([1.0, 1.0], [0.5, 0.5])
-        ray.points.albedo, ray.points.roughness = torch.full((2, 3), 0.4), torch.full((2, 1), 0.5)
         columns = 3 if name == "albedo" else 1
         leaf = torch.tensor(values).repeat(1, columns).requires_grad_()
         setattr(ray.points, name, leaf)
@@ -232,3 +221,56 @@ def test_what_is_seen_pulls_the_light():
     none = torch.zeros(1, 1)
     assert torch.allclose(light(down, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
     assert not torch.allclose(light(up, none), torch.tensor([[0.2, 0.4, 0.8]]), rtol=0.05)
+
+
+class Sky:
+    """A light of one colour, tinted towards +z."""
+
+    def __init__(self, colour: list[float], tint: float):
+        self.colour, self.tint = torch.tensor(colour), tint
+
+    def __call__(self, directions, roughness):
+        return self.colour * torch.exp(self.tint * directions[:, 2:] * torch.tensor([1.0, 0.0, -1.0]))
+
+
+def test_neutral_light_loss_measures_chroma_alone():
+    """Grey light of any brightness costs nothing; a tint e^(t z), e^0, e^(-t z) costs the mean of 2 (t z)^2 / 3."""
+    config, g = tiny(neutral_queries=20000), generator()
+    assert losses.neutral_light_loss(Sky([3.0, 3.0, 3.0], 0.0), config, g).item() == pytest.approx(0.0, abs=1e-9)
+    coloured = Sky([math.exp(0.5), 1.0, math.exp(-0.5)], 0.0)  # the same from everywhere: (0.5^2 + 0 + 0.5^2) / 3
+    assert losses.neutral_light_loss(coloured, config, g).item() == pytest.approx(0.5 / 3, rel=1e-4)
+    tinted = losses.neutral_light_loss(Sky([1.0, 1.0, 1.0], 0.6), config, g).item()
+    assert tinted == pytest.approx(2.0 / 3.0 * 0.36 / 3.0, rel=0.03)
+
+
+def entropy(albedo: list[float], weights: list[float] | None = None, roughness: list[float] | None = None) -> float:
+    """Of grey points, from many draws."""
+    n = len(albedo)
+    ray = rays((weights or [1.0] * n) * 2000, [0.0] * n * 2000)
+    ray.points.albedo = torch.tensor(albedo)[:, None].expand(-1, 3).repeat(2000, 1)
+    ray.points.roughness = torch.tensor(roughness or [0.5] * n)[:, None].repeat(2000, 1)
+    config = tiny(entropy_points=4000, albedo_width=0.3, gloss_width=0.2)
+    return losses.material_entropy_loss(ray, config, generator()).item()
+
+
+def test_material_entropy_counts_materials():
+    """One material: 0. k equal shares of materials far apart: ln k. Two that differ by d in ln albedo:
+    -ln(1/2 + e^(-3 (d/width)^2 / 4) / 2). A share that no ray sees does not count."""
+    assert entropy([0.4]) == pytest.approx(0.0, abs=1e-6)
+    assert entropy([0.02, 0.2, 0.9]) == pytest.approx(math.log(3), abs=0.01)
+    close = -math.log(0.5 + 0.5 * math.exp(-0.75 * (math.log(0.31 / 0.26) / 0.3) ** 2))
+    assert entropy([0.25, 0.30]) == pytest.approx(close, rel=0.02)
+    apart = -math.log(0.5 + 0.5 * math.exp(-0.25 * (0.8 / 0.2) ** 2))
+    assert entropy([0.2, 0.2], roughness=[0.1, 0.9]) == pytest.approx(apart, abs=0.01)
+    assert entropy([0.02, 0.9], weights=[1.0, 0.0]) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_metals_by_hand():
+    """Eq. (18); dark metals, but neither bright ones nor dielectrics; nothing costs nothing."""
+    metallic, shares = torch.tensor([[1.0], [0.4]]), torch.tensor([0.5, 0.25])
+    metal, _ = losses.material_losses(torch.ones(2, 3), metallic, shares)
+    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75)
+    albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]])
+    dark = losses.material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[1]
+    assert dark.item() == pytest.approx((1 - 0.2 / 0.4) / 3)
+    assert not losses.material_losses(torch.zeros(0, 3), torch.zeros(0, 1), torch.zeros(0)).any()
