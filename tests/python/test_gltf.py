@@ -263,27 +263,11 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatc
                 read_asset(path)
 
 
-def test_what_a_file_does_not_hold_costs_more(path):
-    """Numbers without a buffer, and the pixels of a texture before they are unpacked."""
-    gltf = triangle()
-    gltf.json["accessors"].append({"componentType": 5126, "count": 1 << 17, "type": "VEC3"})
-    gltf.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 1
-    with pytest.raises(InputError, match="unpacks to more than its size makes likely"):
-        read_asset(gltf.write(path))
+def test_the_pixels_of_a_texture_cost_more_before_they_are_unpacked():
     grey, asked = encode_png(np.zeros((8, 16, 1))), []
     with pytest.raises(ZeroDivisionError):
         decode_image(grey[:60], "x", lambda n_values: asked.append(n_values) or 1 / 0)
     assert asked == [8 * 16 * 3]
-
-
-def test_few_bytes_do_not_ask_for_much_work(path):
-    """A mesh of 800 primitives, placed 800 times."""
-    gltf = Gltf()
-    mesh = gltf.mesh(*[gltf.primitive()] * 800)
-    for _ in range(800):
-        gltf.node(mesh=mesh)
-    with pytest.raises(InputError, match="unpacks to more than its size makes likely"):
-        read_asset(gltf.write(path))
 
 
 def test_many_nodes_are_told_of(path, capsys, monkeypatch):
@@ -306,13 +290,16 @@ def test_a_long_name_is_shortened_in_a_message(path, capsys):
     assert len(said) == 1 and len(said[0]) < 2100 and said[0].endswith("(alphaMode BLEND); drawn opaque")
 
 
-def endless_zeros(g: Gltf) -> None:
-    g.json["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
+def numbers_without_a_buffer(g: Gltf) -> None:
+    g.json["accessors"].append({"componentType": 5126, "count": 1 << 17, "type": "VEC3"})
+    g.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 1
 
 
-def one_vertex_for_all(g: Gltf) -> None:
-    g.json["accessors"][0]["count"] = 10**9
-    g.json["bufferViews"][0]["byteStride"] = 0
+def many_primitives(g: Gltf) -> None:
+    """A mesh of 800, placed 800 times."""
+    mesh = g.mesh(*[g.primitive()] * 800)
+    for _ in range(800):
+        g.node(mesh=mesh)
 
 
 def many_instances(g: Gltf) -> None:
@@ -322,10 +309,9 @@ def many_instances(g: Gltf) -> None:
         g.node(mesh=0)
 
 
-@pytest.mark.parametrize("change", [endless_zeros, one_vertex_for_all, many_instances])
-def test_what_unpacks_to_more_than_its_size_is_refused(tmp_path, change):
+@pytest.mark.parametrize("change", [numbers_without_a_buffer, many_primitives, many_instances])
+def test_what_unpacks_to_more_than_its_size_is_refused(path, change):
     scene = triangle()
     change(scene)
-    scene.write(tmp_path / "a.glb")
-    with pytest.raises(InputError, match="unpacks to more than its size|byteStride"):
-        read_asset(tmp_path / "a.glb")
+    with pytest.raises(InputError, match="unpacks to more than its size makes likely"):
+        read_asset(scene.write(path))

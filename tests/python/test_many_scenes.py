@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import SimpleNamespace
@@ -67,14 +67,15 @@ def test_two_folders_of_one_name_are_two_scenes_and_stay_so(tmp_path):
     assert [s.name for s in again] == ["chair", "chair-2", "Chair-3", "chair-4"]
 
 
-NOT_A_STATE = ["", "[]", "{}", '{"format": 1, "scenes": [1]}', '{"format": 1, "scenes": [{"name": "a"}]}']
-BESIDE = [[Scene(name, "/data")] for name in ("../other", "/abs/run", 5, "")]
+OF_ONE = {"format": 1, "scenes": [asdict(Scene("a", "/data"))]}
+BESIDE = [OF_ONE | {"scenes": [OF_ONE["scenes"][0] | {"name": name}]} for name in ("../other", "/abs/run", 5, "")]
+DAMAGED = [{"format": 1, "scenes": [1]}, {"format": 1, "scenes": [{"name": "a"}]}, *BESIDE]
 
 
-@pytest.mark.parametrize("state", NOT_A_STATE + BESIDE)
-def test_a_damaged_state_and_runs_beside_the_batch_are_refused(tmp_path, state):
-    (tmp_path / "batch.json").write_text(state) if isinstance(state, str) else keep_scenes(tmp_path, state)
-    with pytest.raises(InputError, match="batch.json"):
+@pytest.mark.parametrize("text", ["", "[]", "{}", *map(json.dumps, DAMAGED)])
+def test_a_damaged_state_and_runs_beside_the_batch_are_refused(tmp_path, text):
+    (tmp_path / "batch.json").write_text(text)
+    with pytest.raises(InputError, match="batch.json: is damaged" if len(text) > 2 else "batch.json"):
         known_scenes(tmp_path)
 
 

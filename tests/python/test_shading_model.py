@@ -30,15 +30,20 @@ def points_of(metallic: float, roughness: float = 0.4) -> tuple:
     return albedo, torch.full((K, 1), roughness), torch.full((K, 1), metallic)
 
 
+def seen() -> tuple[torch.Tensor, torch.Tensor]:
+    """Normals, and directions to viewers anywhere above them."""
+    g = generator(4)
+    normals = unit(torch.randn(K, 3, generator=g))
+    return normals, unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
+
+
 def shade(light: Light, materials: tuple, occlusion: Occlusion | None = None, **settings: object) -> ShadedPoints:
     """Points of these materials, seen from anywhere above, by a model with this light and these factors."""
     model = SceneModel(tiny(**{"shading.method": "split"}, **settings))
     model.light, model.material = light, Given(lambda *_: materials)
     if occlusion is not None:
         model.occlusion_at = lambda *_: occlusion
-    g = generator(4)
-    normals = unit(torch.randn(K, 3, generator=g))
-    views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
+    normals, views = seen()
     n_features = model.sdf_field.grid.spec.n_outputs
     light = model.light.evaluate()
     return model.shade(light, torch.zeros(K, 3), torch.zeros(K, 13), torch.zeros(K, n_features), normals, views)
@@ -80,9 +85,7 @@ MODES = {"exact": 0, "paper": 1}  # by their numbers in the reference
 def test_the_model_shades_by_the_terms_that_are_set(mode, compensate):
     light, materials = TwoLights(2.0, 3.0), points_of(0.8, roughness=0.7)
     shaded = shade(light, materials, **{"shading.fresnel": mode, "shading.compensate": compensate})
-    g = generator(4)
-    normals = unit(torch.randn(K, 3, generator=g))
-    views = unit(normals + 0.97 * unit(torch.randn(K, 3, generator=g)))
+    normals, views = seen()
     white, one = torch.ones(K, 3), torch.ones(K, 1)
 
     def by(mode: str, compensate: bool) -> torch.Tensor:
