@@ -26,10 +26,14 @@ def directions_of_map(height):
 
 
 def sphere_alpha(pose, centre, radius, size=SIZE):
-    """Coverage of a sphere seen by a pinhole camera, straight from the quadratic."""
-    focal = 0.5 * size / np.tan(0.5 * ANGLE)
-    y, x = np.mgrid[:size, :size] + 0.5
-    rays = np.stack([(x - size / 2) / focal, -(y - size / 2) / focal, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
+    """Coverage of a sphere seen by a pinhole camera."""
+    y, x = (np.mgrid[:size, :size] + 0.5 - size / 2) / (0.5 * size / np.tan(0.5 * ANGLE))
+    return sphere_seen(pose, x, y, centre, radius)
+
+
+def sphere_seen(pose, x, y, centre, radius):
+    """Coverage of a sphere in the directions (x, y, 1) of a camera, y down, straight from the quadratic."""
+    rays = np.stack([x, -y, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     offset = pose[:3, 3] - centre
     return ((rays @ offset) ** 2 > offset @ offset - radius**2).astype(np.float32)

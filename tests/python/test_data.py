@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha
+from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha, sphere_seen
 from layout_scenes import CENTRE, LENS, RADIUS, opencv_points, seen_by_pixels, write_transforms
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
@@ -314,18 +314,10 @@ def bent_scene(root, k: dict, **keys):
     write_transforms(root, masks=True, **keys)
     x, y = seen_by_pixels(k, LENS, SIZE, SIZE)
     for i, frame in enumerate(json.loads((root / "transforms.json").read_text())["frames"]):
-        alpha = sphere_seen(np.array(frame["transform_matrix"]), x, y)
+        alpha = sphere_seen(np.array(frame["transform_matrix"]), x, y, CENTRE, RADIUS)
         write_image(root / f"images/v{i:02d}.png", np.full((SIZE, SIZE, 3), 0.25) + 0.5 * alpha[..., None])
         write_image(root / f"masks/v{i:02d}.png.png", alpha)
     return root
-
-
-def sphere_seen(pose: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Coverage of the sphere in the directions (x, y, 1) of a camera, y down."""
-    rays = np.stack([x, -y, -np.ones_like(x)], axis=-1) @ pose[:3, :3].T
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    offset = pose[:3, 3] - CENTRE
-    return ((rays @ offset) ** 2 > offset @ offset - RADIUS**2).astype(np.float32)
 
 
 STRONG = {"k1": 0.9, "p1": 0.01}
@@ -388,7 +380,7 @@ def test_colours_beside_a_mask_do_not_bleed_into_the_object(tmp_path):
     write_transforms(tmp_path, **STRONG)
     x, y = seen_by_pixels(STRONG, LENS, SIZE, SIZE)
     for i, frame in enumerate(json.loads((tmp_path / "transforms.json").read_text())["frames"]):
-        alpha = sphere_seen(np.array(frame["transform_matrix"]), x, y)
+        alpha = sphere_seen(np.array(frame["transform_matrix"]), x, y, CENTRE, RADIUS)
         write_image(tmp_path / f"images/v{i:02d}.png", np.dstack([1 - alpha] * 3 + [alpha]))
     data = load_dataset(tmp_path)
     assert data.images[data.images[..., 3] > 0.1][:, :3].max() < 0.05

@@ -139,6 +139,7 @@ def test_the_field_reads_the_copy():
         assert torch.equal(rounded.sdf(x), plain.sdf(x))
     a, b = rounded.sample(x), plain.sample(x)
     assert torch.equal(a.outputs, b.outputs) and torch.equal(a.gradient, b.gradient)
+    torch.testing.assert_close(rounded.sdf(x), a.sdf)  # with gradients
     o, d, jitter = (t.float() for t in field_rays())
     samples = [
         sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)

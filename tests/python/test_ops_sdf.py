@@ -181,18 +181,6 @@ def gradients(function, inputs: tuple) -> tuple[tuple, list[torch.Tensor]]:
     return outputs, list(torch.autograd.grad(total, leaves[1:8]))
 
 
-def test_only_the_length_of_a_row_has_a_length():
-    """A direction may be three times as long, and its gradient is at right angles to it."""
-    inputs = sdf_field_inputs(40)
-    longer = tuple(3 * x if i in (2, 5) else x for i, x in enumerate(inputs))
-    (outputs, grads), (same, of_longer) = gradients(lib.sdf_field, inputs), gradients(lib.sdf_field, longer)
-    for i, (a, b) in enumerate(zip([*outputs, *grads], [*same, *of_longer])):
-        torch.testing.assert_close(a, 3 * b if i in (4, 7) else b)
-    for i in (2, 5):
-        along = (grads[i - 1] * inputs[i]).sum(1)
-        torch.testing.assert_close(along, torch.zeros_like(along), rtol=0, atol=1e-9)
-
-
 def test_field_reads_the_copy_of_the_table():
     inputs = sdf_field_inputs(70, torch.float32)
     stored = inputs[1].half()

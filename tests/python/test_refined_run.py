@@ -105,17 +105,6 @@ def test_another_run_in_the_folder_leaves_nothing_of_the_refinement(run, data, t
     assert bytes_of(again, "mesh.glb") == bytes_of(run / "trained", "mesh.glb")
 
 
-def test_photos_that_cannot_be_fitted_leave_the_trained_asset(data, tmp_path, capsys, monkeypatch):
-    def refuses(*args, **kwargs):
-        raise InputError("no pixel of the photos shows the asset")
-
-    monkeypatch.setattr(pipeline, "refine_folder", refuses)
-    run = tmp_path / "run"
-    assert train(data, run, "--steps", "12", *REFINED) == DONE
-    assert "without refinement, as no pixel" in capsys.readouterr().err
-    assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
-
-
 def test_an_export_does_not_replace_what_the_refinement_fitted(run, tmp_path, capsys):
     run = shutil.copytree(run, tmp_path / "run")
     kept = bytes_of(run, *DELIVERED)

@@ -55,15 +55,6 @@ def test_every_way_to_ask_gives_the_same_outputs():
     assert field.sdf(x).requires_grad and not quick.requires_grad
 
 
-def test_what_is_read_of_a_table_of_16_bits_is_the_same_with_and_without_gradients():
-    field = field_of(torch.float32, table_dtype=torch.float16)
-    with torch.no_grad():
-        field.grid.table.mul_(1000.0)  # so that roundings show
-        quick = field.sdf(points().float())
-    torch.testing.assert_close(quick, field.sdf(points().float()), rtol=1e-4, atol=1e-3)
-    assert field.network().table.dtype == torch.float16
-
-
 def test_a_loss_on_outputs_and_gradient_reaches_every_parameter():
     """By differences of 1e-6 in each parameter's direction of its own gradient."""
     field, x = field_of(), points(20)

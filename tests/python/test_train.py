@@ -222,7 +222,9 @@ def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch
     asking, run = Asking(), tmp_path / "run"
     reconstruct(data, run, tiny(steps=30, **{"refinement.enabled": True}), observer=together([asking, Stages()]))
     assert asking.heard[-3:] == [("export", None), ("refinement", True), ("evaluation", True)]
-    said = [line.partition(",")[0] for line in capsys.readouterr().err.splitlines() if line.startswith("stage")]
+    assert "without refinement, as nothing to fit" in (err := capsys.readouterr().err)
+    assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
+    said = [line.partition(",")[0] for line in err.splitlines() if line.startswith("stage")]
     where = f"on {torch.get_num_threads()} threads of the CPU; in all 30 steps; results go to {run}"
     names = [f"training {where}", "export", "refinement", "evaluation"]
     assert said == [f"stage {number} of 4: {name}" for number, name in enumerate(names, 1)]

@@ -94,35 +94,27 @@ def products(rows: Rows, shared: Rows) -> Rows:
     return {"products": torch.stack(found) if found else values.new_empty(0, 80, 3)}
 
 
+def filter_entry(name: str, shared: Rows, reason: str, **options) -> Entry:
+    return Entry(
+        name,
+        draw=draw_queries,
+        call=filtered,
+        smooth_shared=("light",),
+        shared=shared,
+        repair=repaired,
+        bound=4e-6,
+        gradient_bound=1e-5,
+        exact=exact_light.prefilter_light,
+        exact_bound=1e-13,
+        reason=reason,
+        **options,
+    )
+
+
+LIGHTS_ADDED = "a few roundings and the sum over the lights; weights go down to 1e-16: light below 1e-22 underflows"
 ENTRIES = (
-    Entry(
-        "prefilter_light",
-        draw=draw_queries,
-        call=filtered,
-        smooth_shared=("light",),
-        shared=lamps(),
-        repair=repaired,
-        bound=4e-6,
-        gradient_bound=1e-5,
-        floor=1e-22,
-        exact=exact_light.prefilter_light,
-        exact_bound=1e-13,
-        size=1,
-        reason="a few roundings and the sum over the lights; weights go down to 1e-16: light below 1e-22 underflows",
-    ),
-    Entry(
-        "prefilter_light, 1e30",
-        draw=draw_queries,
-        call=filtered,
-        smooth_shared=("light",),
-        shared=bright(1e30),
-        repair=repaired,
-        bound=4e-6,
-        gradient_bound=1e-5,
-        reason="as above; a constant light stays itself",
-        exact=exact_light.prefilter_light,
-        exact_bound=1e-13,
-    ),
+    filter_entry("prefilter_light", lamps(), LIGHTS_ADDED, floor=1e-22),
+    filter_entry("prefilter_light, 1e30", bright(1e30), "as above; a constant light stays itself"),
     Entry(
         "light_lookup",
         draw=draw_lookup,

@@ -187,21 +187,26 @@ def surface_entry(name: str, s: float, anneal: float) -> Entry:
     )
 
 
+def sums_entry(name: str, samples: int, **options) -> Entry:
+    return Entry(
+        name,
+        draw=partial(draw_composite, samples=samples),
+        call=sums,
+        smooth=("weights", "values"),
+        bound=1e-6,
+        gradient_bound=1e-6,
+        reason="sums in float64, rounded once; gradients are sums over the channels",
+        **options,
+    )
+
+
 ENTRIES = (
     surface_entry("surface_weights", 200.0, 1.0),
     ends_entry("surface_weights, any ends", 1.0, draw_ends, WIDEST),
     ends_entry("surface_weights, any ends, s = 8000", 8000.0, partial(draw_ends, s=8000.0), WIDEST / 8000),
     ends_entry("surface_weights, 10^4 samples", 64.0, draw_long, 1.0, size=LONG, chunk=8, exact=None),
     surface_entry("surface_weights, annealed", 20.0, 0.3),
-    Entry(
-        "composite",
-        draw=partial(draw_composite, samples=SAMPLES),
-        call=sums,
-        smooth=("weights", "values"),
-        bound=1e-6,
-        gradient_bound=1e-6,
-        reason="sums in float64, rounded once; gradients are sums over the channels",
-    ),
+    sums_entry("composite", SAMPLES),
     Entry(
         "composite, divided by the opacity",
         draw=draw_means,
@@ -212,17 +217,7 @@ ENTRIES = (
         repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
         reason="a sum in float64 and one division",
     ),
-    Entry(
-        "composite, 10^4 samples",
-        draw=partial(draw_composite, samples=LONG),
-        call=sums,
-        smooth=("weights", "values"),
-        bound=1e-6,
-        gradient_bound=1e-6,
-        size=LONG,
-        chunk=8,
-        reason="sums in float64, rounded once; gradients are sums over the channels",
-    ),
+    sums_entry("composite, 10^4 samples", LONG, size=LONG, chunk=8),
     Entry(
         "interpolate",
         draw=draw_interpolation,
