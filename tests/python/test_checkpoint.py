@@ -293,6 +293,15 @@ REFUSED = [
     ("cells is missing", changed("cells", torch.flatten)),
     ("box_from_world is missing", put(box_from_world=torch.eye(4))),
     ("box_from_world is missing", put(box_from_world=torch.eye(3).double())),
+    *(
+        ("box_from_world is not a uniform scale and a translation", changed("box_from_world", change))
+        for change in (
+            torch.zeros_like,
+            lambda box: box * torch.tensor([[-1.0], [1], [1], [1]]),
+            lambda box: torch.cat([box[:3], torch.ones_like(box[:1])]),
+            lambda box: box + 0.5 * torch.eye(4).roll(1, 1) * torch.tensor([[1.0], [0], [0], [0]]),
+        )
+    ),
     ("cameras are missing", put(cameras=None)),
     ("cameras are missing", drop("cameras", "intrinsics")),
     ("cameras' intrinsics", lambda c: put("cameras", poses=torch.cat(2 * [c["cameras"]["poses"]]))(c)),

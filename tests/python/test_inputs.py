@@ -309,10 +309,14 @@ def test_a_mask_is_no_photo(tmp_path):
     make_blender(tmp_path, train=6, test=2)
     edit(tmp_path, lambda meta: meta["frames"][2].update(file_path="train/a", mask_path="train/a.png"))
     edit(tmp_path, lambda meta: meta["frames"][3].update(mask_path="", behind_path=""))
+    edit(tmp_path, lambda meta: meta["frames"][4].update(mask_path=None))
     (tmp_path / "train/r_2.png").rename(tmp_path / "train/a.jpg")
     write_image(tmp_path / "train/a.png", np.ones((SIZE, SIZE)))
     frames = transforms.read(tmp_path, "train")
-    assert frames[2].image_path.name == "a.jpg" and frames[3].mask_path is frames[3].behind_path is None
+    assert (
+        frames[2].image_path.name == "a.jpg"
+        and frames[3].mask_path is frames[3].behind_path is frames[4].mask_path is None
+    )
     (tmp_path / "train/a.jpg").unlink()
     (tmp_path / "train/a.jpg.png").write_bytes(b"")
     for name in ("train/a", "train/a.jpg"):

@@ -123,12 +123,6 @@ def test_photos_need_a_mask_of_the_object(tmp_path):
         load_dataset(root)
 
 
-def test_masks_that_are_null_are_none(tmp_path):
-    root = write_transforms(tmp_path / "a")
-    edit(root, lambda m: [frame.update(mask_path=None) for frame in m["frames"]], "transforms.json")
-    assert np.array_equal(load_dataset(root).images, load_dataset(write_transforms(tmp_path / "b")).images)
-
-
 def test_dynamic_masks_are_white_where_they_ignore(tmp_path):
     root = write_transforms(tmp_path, masks=True)
     for i in range(0, COUNT, 2):

@@ -8,7 +8,6 @@ from op_cases import LIGHT_NODES, lookup_inputs, octahedral_directions
 from op_checks import check_error, generator, lib, on_threads, unit
 from splitnerf import _core
 from splitnerf.ops.light import (
-    SparseMap,
     SparseRows,
     light_averages,
     light_filters,
@@ -18,10 +17,6 @@ from splitnerf.ops.light import (
     sparse_product,
     zonal_factors,
 )
-
-
-def as_double(matrix: SparseMap) -> SparseMap:
-    return matrix.to(torch.float64)
 
 
 def dense(matrix: SparseRows) -> torch.Tensor:
@@ -34,7 +29,7 @@ def dense(matrix: SparseRows) -> torch.Tensor:
 
 
 def test_a_map_of_several_parts_holds_its_transpose():
-    matrix = as_double(light_filters(8, [(8, 0.3), (4, 0.4)]))
+    matrix = light_filters(8, [(8, 0.3), (4, 0.4)]).to(torch.float64)
     values = torch.randn(64, 3, generator=generator(), dtype=torch.float64)
     torch.testing.assert_close(sparse_product(matrix, values), dense(matrix.rows) @ values, rtol=1e-12, atol=1e-12)
     torch.testing.assert_close(dense(matrix.transposed), dense(matrix.rows).T, rtol=0, atol=0)
@@ -44,8 +39,8 @@ def test_the_rows_of_a_filter_are_lobes_about_their_texels_in_all_quarters_of_th
     """A lobe scales a light that is linear in the direction by the factor of degree 1."""
     axes = torch.tensor([[1.0, 2.0, 3.0], [-2.0, 1.0, 0.5], [0.0, 0.0, 1.0]]).double()
     light, texels = octahedral_directions(32).double() @ axes, octahedral_directions(16).double()
-    averages = sparse_product(as_double(light_averages(32)), light)
-    found = sparse_product(as_double(light_filters(32, [(16, 0.5)])), averages)
+    averages = sparse_product(light_averages(32).to(torch.float64), light)
+    found = sparse_product(light_filters(32, [(16, 0.5)]).to(torch.float64), averages)
     factor = zonal_factors(0.5, 2)[0, 1].item()
     torch.testing.assert_close(found, factor * texels @ axes, rtol=0, atol=0.04)
 
@@ -106,7 +101,7 @@ def test_averages_and_filters_keep_a_constant_and_the_total():
     ones = torch.ones(256, 3)
     torch.testing.assert_close(sparse_product(averages, ones), torch.ones(320, 3), rtol=0, atol=1e-6)
     light = torch.rand(256, 3, generator=generator(), dtype=torch.float64)
-    coarse = sparse_product(as_double(averages), light)[256:]
+    coarse = sparse_product(averages.to(torch.float64), light)[256:]
     total = (coarse * torch.from_numpy(_core.octahedral_solid_angles(8))[:, None]).sum(0)
     torch.testing.assert_close(total, (light * angles[:, None]).sum(0), rtol=1e-6, atol=0)
     filters = light_filters(16, [(16, 0.2), (8, 0.4)])
@@ -116,7 +111,7 @@ def test_averages_and_filters_keep_a_constant_and_the_total():
 
 
 def test_levels_are_interpolated_and_added():
-    matrix = as_double(light_sum_of_levels(16))
+    matrix = light_sum_of_levels(16).to(torch.float64)
     parameters = torch.zeros(16 + 64 + 256, 3, dtype=torch.float64)
     parameters[:16], parameters[16:80], parameters[80:] = 1.0, 2.0, torch.rand(256, 3, generator=generator())
     torch.testing.assert_close(sparse_product(matrix, parameters), parameters[80:] + 3.0, rtol=1e-6, atol=1e-6)

@@ -6,9 +6,8 @@ import os
 
 import numpy as np
 import pytest
-import torch
 from gltf_builder import triangle
-from splitnerf.cli import BAD_INPUT, DONE, FAILED, main
+from splitnerf.cli import DONE, FAILED, main
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from tiny_runs import command, contents, refused
@@ -163,18 +162,3 @@ def test_any_error_is_one_line(monkeypatch, capsys, error, words):
         monkeypatch.setenv("SPLITNERF_TRACEBACK", "1")
         with pytest.raises(type(error)):
             main(["info", "--settings"])
-
-
-def test_a_checkpoint_whose_frame_cannot_be_left(begun, tmp_path):
-    content = torch.load(begun[0] / "checkpoint.pt", weights_only=True)
-    changes = (
-        lambda box: box.zero_(),
-        lambda box: box[0].neg_(),
-        lambda box: box[3].fill_(1.0),
-        lambda box: box[0, 1].fill_(0.5),
-    )
-    for change in changes:
-        box = content["box_from_world"].clone()
-        change(box)
-        torch.save(content | {"box_from_world": box}, tmp_path / "checkpoint.pt")
-        assert main(["export", str(tmp_path)]) == BAD_INPUT

@@ -4,6 +4,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import splitnerf
 import torch
@@ -13,13 +14,6 @@ from tiny_runs import tiny
 
 PACKAGE = Path(splitnerf.__file__).parent
 MOST = 13  # files beside those of splitnerf/ops/
-
-
-class Silent:
-    """A progress bar that shows nothing."""
-
-    def show(self, *_: object) -> None:
-        pass
 
 
 def files_of(work: Callable[[], None]) -> Counter[str]:
@@ -47,7 +41,7 @@ def test_a_step_goes_through_few_files(data, tmp_path):
     def steps(n: int) -> None:
         for _ in range(n):
             training.refresh()
-            training.advance(Silent())
+            training.advance(SimpleNamespace(show=lambda *_: None))
 
     steps(21)
     training.mesh.request(training.progress)

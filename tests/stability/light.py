@@ -15,7 +15,7 @@ RESOLUTIONS, NODES, ZONAL_ROWS = (16, 8, 4), (0.1, 0.2, 0.35, 0.5), 33
 
 
 def repaired(rows: Rows) -> Rows:
-    return {"query_dirs": directions_of(rows["query_dirs"]), "roughness": rows["roughness"].clamp(0, 1)}
+    return {name: x.clamp(0, 1) if name == "roughness" else directions_of(x) for name, x in rows.items()}
 
 
 def draw_queries(draw: Draw, n: int) -> Rows:
@@ -54,10 +54,6 @@ def draw_lookup(draw: Draw, n: int) -> Rows:
     texel[:, 2] = torch.where(texel.abs().sum(1) == 0, 1.0, texel[:, 2])
     directions = torch.where(draw.chance(0.3, n, 1), unit(texel), draw.directions(n))
     return {"directions": directions, "roughness": draw.mixed(NODES + (0.0, 1e-7, 1.0), draw.uniform(n, 1)).clamp(0, 1)}
-
-
-def repaired_lookup(rows: Rows) -> Rows:
-    return {"directions": directions_of(rows["directions"]), "roughness": rows["roughness"].clamp(0, 1)}
 
 
 @lru_cache(maxsize=1)
@@ -122,7 +118,7 @@ ENTRIES = (
         smooth=("directions", "roughness"),
         smooth_shared=("levels", "sh"),
         shared=pyramid(),
-        repair=repaired_lookup,
+        repair=repaired,
         vectors=("directions",),
         bound=4e-6,
         gradient_bound=2e-5,
