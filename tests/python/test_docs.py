@@ -21,6 +21,7 @@ from doc_blocks import PAGES, ROOT, Block, blocks_of, inline_commands, name_of
 from splitnerf.cli import DONE, build_parser, main
 from splitnerf.config.settings import tomllib
 from splitnerf.data.images import write_image
+from splitnerf.relight.cameras import path_views
 from tiny_runs import SMALL, as_options, train
 
 COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
@@ -193,3 +194,24 @@ def test_the_method_s_figures_are_those_that_the_program_draws(tmp_path, monkeyp
     for name in ("lobe", "neus"):
         method_figures.FIGURES[name]().savefig(tmp_path / "figure.png")
         assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+SHOWN = re.compile(r"<!-- not run: lines of (\S+),.*?-->\n```\w+\n(.*?)```", re.DOTALL)
+
+
+def test_what_a_page_shows_of_an_example_is_in_it():
+    shown = SHOWN.findall((ROOT / "docs" / "own_code.md").read_text())
+    assert len(shown) == 2
+    for name, lines in shown:
+        script = [line.strip() for line in (ROOT / name).read_text().splitlines()]
+        wanted = [line.strip() for line in lines.splitlines()]
+        runs = (script[i : i + len(wanted)] for i in range(len(script)))
+        assert wanted in list(runs), (name, wanted[0])
+
+
+def test_the_camera_that_a_page_gives_looks_at_the_front(tmp_path):
+    (text,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs" / "other_programs.md").read_text(), re.DOTALL)
+    (tmp_path / "camera.json").write_text(text)
+    (view,) = path_views(tmp_path / "camera.json", None)
+    assert (view.pose[:3, 3] == (0, -3, 0)).all() and (view.pose[:3, 2] == (0, -1, 0)).all()
+    assert (view.width, view.height) == (512, 512) == tuple(json.loads(text)[name] for name in "wh")

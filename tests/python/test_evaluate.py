@@ -14,14 +14,16 @@ from painted_ball import bare
 from splitnerf.cli import DONE, main
 from splitnerf.data.asset import Material
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
-from splitnerf.data.truth import map_files, read_relit, relight_maps
+from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, write_image
+from splitnerf.data.truth import ViewTruth, map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
 from splitnerf.evaluate import lpips as ours
+from splitnerf.evaluate import sheet
 from splitnerf.evaluate.lpips import BACKBONE_WEIGHTS, find_distance
 from splitnerf.evaluate.protocol import ScaledView, scaled_scores
 from splitnerf.evaluate.score_table import evaluation_table, table_of_lights
 from splitnerf.evaluate.scoring import (
+    Evaluated,
     Protocol,
     RelitViews,
     asset_predictions,
@@ -32,6 +34,7 @@ from splitnerf.evaluate.scoring import (
     relight,
     relight_scores,
 )
+from splitnerf.evaluate.sheet import picture_grid, write_sheet
 from splitnerf.export.writers import write_glb
 from tiny_runs import refused
 
@@ -250,7 +253,8 @@ class Answers:
         }
 
 
-def write_asset_views(tmp_path: Path) -> Dataset:
+@pytest.fixture
+def asset_views(tmp_path) -> Dataset:
     """Three test views of their own poses and lenses, in a frame half as large as the world, each under two lights."""
     paths = [tmp_path / f"test/r_{i}.png" for i in range(3)]
     images = np.full((3, HEIGHT, WIDTH, 4), 0.5, np.float32)
@@ -266,11 +270,6 @@ def write_asset_views(tmp_path: Path) -> Dataset:
     return Dataset(
         "toy", tmp_path, "test", 1, images, poses, lenses, [p.stem for p in paths], paths, np.diag([0.5, 0.5, 0.5, 1.0])
     )
-
-
-@pytest.fixture
-def asset_views(tmp_path) -> Dataset:
-    return write_asset_views(tmp_path)
 
 
 def maps_of(asset_views: Dataset) -> dict[str, Path]:
@@ -343,6 +342,71 @@ def test_scores_of_a_file_lie_beside_it():
     assert evaluation_path(Path("a/chair.glb")) == Path("a/chair_evaluation.json")
     assert evaluation_path(Path("a/run")) == Path("a/run/evaluation.json")
     assert is_asset(Path("a.GLB")) and is_asset(Path("a.gltf")) and not is_asset(Path("a.obj"))
+
+
+# ---- the sheet of pictures ----
+
+
+def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, tmp_path, monkeypatch):
+    """On white by its own coverage, scaled by the headline's factor; normals where the truth is known."""
+    shown = {}
+
+    def noted(heads, rows):
+        shown.update(heads=heads, rows=dict(rows))
+        return picture_grid(heads, rows)
+
+    monkeypatch.setattr(sheet, "picture_grid", noted)
+    data = asset_views.select([0, 1, 2, 0, 1])
+    grey = np.full((HEIGHT, WIDTH), 0.25, np.float32)
+    colour = np.repeat(grey[..., None], 3, axis=-1)
+    normal = np.broadcast_to(TILTED, (HEIGHT, WIDTH, 3))
+    mask = np.zeros((HEIGHT, WIDTH), bool)
+    mask[0] = True
+    truths = [ViewTruth("a", colour, grey, 2 * grey, normal, mask)] * 5
+    alpha = np.full((HEIGHT, WIDTH), 0.8, np.float32)
+    prediction = {"rgb": 3 * colour, "alpha": alpha, "albedo": 2 * colour}
+    prediction |= {"roughness": 3 * grey, "metallic": grey, "normal": -normal}
+    images = [np.full((HEIGHT, WIDTH, 4), 51 * i, np.uint8) for i in range(5)]
+    evaluation = {"relight": {"lsq": {"scale": [2.0] * 3}}, "albedo": {"lsq": {"scale": [0.5, 1.0, 2.0]}}}
+    relit = RelitViews({"day": images}, data, 1)
+    write_sheet(tmp_path / "s.png", Evaluated(evaluation, data, [prediction] * 5, truths, relit))
+    rows = shown["rows"]
+    assert list(rows) == ["novel view", "relit by\nday", "albedo", "roughness", "metallic", "normal"]
+    assert [head.split(":")[0] for head in shown["heads"]] == ["r_0"] * 3 + ["r_2"] * 3 + ["r_1"] * 3
+
+    def on_white(linear, coverage):
+        return over_background(np.clip(linear_to_srgb(np.float32(linear)), 0, 1), np.float32(coverage))
+
+    relit = [
+        (
+            on_white([srgb_to_linear(np.float32(0.3 + 0.2 * (i % 3)))] * 3, 0.3 + 0.2 * (i % 3)),
+            on_white([2 * srgb_to_linear(np.float32(0.2 * i))] * 3, 0.2 * i),
+        )
+        for i in (0, 2, 4)
+    ]
+    expected = {
+        "novel view": [(np.full(3, 0.75), np.full(3, 0.8)) for _ in range(3)],
+        "relit by\nday": relit,
+        "albedo": [(on_white([0.25] * 3, 0.5), on_white([0.25, 0.5, 1.0], 0.8))] * 3,
+        "roughness": [(np.full(3, 0.625), np.full(3, 0.8))] * 3,
+        "metallic": [(np.full(3, 0.75), np.full(3, 0.4))] * 3,
+        "normal": [(0.5 + 0.5 * TILTED, 0.5 - 0.5 * TILTED)] * 3,
+    }
+    for name, pairs in expected.items():
+        for i, (truth, found) in enumerate(pairs):
+            panels = [panel[0, 0] for panel in rows[name][3 * i : 3 * i + 3]]
+            for panel, value in zip(panels, (truth, found, np.clip(4 * np.abs(found - truth), 0, 1)), strict=True):
+                assert panel == pytest.approx(value, abs=0.03 if name.startswith("relit") else 1e-4), (name, i)
+    assert rows["normal"][0][1, 1] == pytest.approx([1, 1, 1])
+
+
+def test_small_pictures_are_enlarged_and_stand_in_their_rows():
+    pictures = [np.full((10, 50, 3), level, np.float32) for level in (0.2, 0.4, 0.6, 0.8)]
+    found = picture_grid(["a", "b"], [("one", pictures[:2]), ("two", pictures[2:])])
+    assert found.shape == (sheet.LABEL_HEIGHT + 80, sheet.LABEL_WIDTH + 400, 3)
+    for k, (row, column) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+        at = found[sheet.LABEL_HEIGHT + 40 * row + 39, sheet.LABEL_WIDTH + 200 * column + 150]
+        assert at == pytest.approx([0.2 + 0.2 * k] * 3, abs=0.003)
 
 
 # ---- LPIPS ----
