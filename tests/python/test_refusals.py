@@ -95,9 +95,6 @@ def test_numbers_of_pictures_and_paths_have_a_limit(tmp_path, asset, grey, capsy
         assert f"{option} must be at least 1 and at most" in refused(capsys, *words)
     for words in (["evaluate", asset, "--data", tmp_path], ["ablate", tmp_path]):
         assert "--spp must be at least 1 and at most 1048576" in refused(capsys, *words, "--spp", 3 * 10**9)
-    assert "--resolution must be in [8, 4096], got 100000" in refused(
-        capsys, "export", tmp_path, "--resolution", 100000
-    )
     assert not out.exists()
 
 

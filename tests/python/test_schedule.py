@@ -21,6 +21,7 @@ from splitnerf.training.schedule import (
     next_ray_count,
     set_learning_rate,
 )
+from test_refreshes import calls
 from tiny_runs import tiny, train_scene
 
 
@@ -185,10 +186,7 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
         monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
     )
     terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, losses)
-    requested, request = [], SurfaceMesh.request
-    monkeypatch.setattr(
-        SurfaceMesh, "request", lambda self, progress: requested.append(progress) or request(self, progress)
-    )
+    requested = calls(monkeypatch, SurfaceMesh, "request", lambda _, progress: progress)
     train_scene(load_dataset(data), config, tmp_path)
 
     assert levels == [min(8, 2 + math.floor(6 * step / (0.6 * n))) for step in range(n)]
