@@ -70,8 +70,7 @@ class EvaluatedLight:
     passes them on to the light's parameters.
 
     Args:
-        light: The light.
-        parts: What steps share of its evaluation, see :meth:`Light.parts`.
+        parts: What steps share of the light's evaluation, see :meth:`Light.parts`.
 
     Attributes:
         leaves: Copies of the parts and of the cells' radiance, where gradients accumulate; () where every backward pass
@@ -162,9 +161,6 @@ class Light(nn.Module, abc.ABC):
     """
 
     needs_consistency_loss = True
-
-    def __init__(self) -> None:
-        super().__init__()
 
     @abc.abstractmethod
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
@@ -271,7 +267,6 @@ class LightMlp(Light):
         return torch.cat([w.sin(), w.cos(), r.sin(), r.cos()], dim=1)
 
     def forward(self, directions: Tensor, roughness: Tensor) -> Tensor:
-        """directions [n, 3] unit, roughness [n, 1] in [0, 1] -> radiance [n, 3] >= 0."""
         encoded = self.encode(directions, roughness)
         h = encoded
         for layer in self.hidden:

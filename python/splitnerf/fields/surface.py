@@ -43,7 +43,6 @@ class SdfField(nn.Module):
     grid contributes through its Jacobian (:func:`splitnerf.ops.sdf.sdf_field`).
 
     Args:
-        spec: Shape of the hash grid.
         box: Half size of the cube that the grid covers, scene units.
         width: The number of hidden units.
         n_outputs: The number of outputs, with the distance.
@@ -51,8 +50,7 @@ class SdfField(nn.Module):
         table_dtype: The dtype in which the hash table is read, see :class:`splitnerf.ops.sdf.HashGrid`.
 
     Source: NeuS (Wang et al. 2021) on a hash grid (Mueller et al. 2022), with the sizes of SplitNeRF's supplement;
-    sphere
-    initialisation: Atzmon and Lipman 2020.
+    sphere initialisation: Atzmon and Lipman 2020.
     """
 
     def __init__(
@@ -87,28 +85,19 @@ class SdfField(nn.Module):
             torch._weight_norm(self.out_direction, self.out_length),
         )
 
-    def _to_unit(self, positions: Tensor) -> Tensor:
-        return positions * (0.5 / self.box) + 0.5
-
-    def _inputs(self, positions: Tensor, features: Tensor) -> Tensor:
-        return torch.cat([positions, features], dim=1)
-
-    def _outputs(self, inputs: Tensor, n_outputs: int | None = None) -> Tensor:
-        """The first n_outputs outputs (default: all)."""
+    def forward(self, positions: Tensor, n_outputs: int | None = None) -> tuple[Tensor, Tensor]:
+        """The first n_outputs outputs [n, n_outputs] (default: all) and the hash features [n, C] at positions [n, 3], scene
+        units."""
+        features = self.grid(positions * (0.5 / self.box) + 0.5)
         hidden, out = self._weights()
-        h = F.softplus(F.linear(inputs, hidden, self.hidden_bias), SOFTPLUS_BETA)
-        return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs])
-
-    def forward(self, positions: Tensor) -> tuple[Tensor, Tensor]:
-        """The outputs [n, n_outputs] and the hash features [n, C] at positions [n, 3], scene units."""
-        features = self.grid(self._to_unit(positions))
-        return self._outputs(self._inputs(positions, features)), features
+        h = F.softplus(F.linear(torch.cat([positions, features], dim=1), hidden, self.hidden_bias), SOFTPLUS_BETA)
+        return F.linear(h, out[:n_outputs], self.out_bias[:n_outputs]), features
 
     def sdf(self, positions: Tensor) -> Tensor:
         """Signed distance [n] at positions [n, 3], scene units."""
         if not torch.is_grad_enabled():
             return sdf_values(positions, self.network())
-        return self._outputs(self._inputs(positions, self.grid(self._to_unit(positions))), 1)[:, 0]
+        return self(positions, 1)[0][:, 0]
 
     @torch.no_grad()
     def network(self) -> SdfNetwork:
