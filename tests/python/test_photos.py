@@ -299,9 +299,7 @@ def test_edges_of_averages_are_compared_whole(tmp_path):
     source = source_of(dataset, averaging(dataset, 3))
     assert (source.height, source.width) == (40, 60)
     everywhere = torch.arange(40 * 60)
-    pixels, _, behind, whole = source.pixels.read(
-        everywhere, 0 * everywhere, torch.ones(2, 3), torch.rand(2400, 3), source.edges
-    )
+    pixels, _, behind, whole = source.read(everywhere, 0 * everywhere, torch.ones(2, 3), torch.rand(2400, 3))
     pixels, behind, whole = (x.unflatten(0, (40, 60)) for x in (pixels, behind, whole))
     blocks = area_average(srgb_to_linear(photo[..., :3] / np.float32(255)), 3)
     expected = linear_to_srgb(blocks)
@@ -322,7 +320,7 @@ def test_what_the_data_tell_of_the_background_is_compared(tmp_path):
     source = source_of(dataset, averaging(dataset, 3))
     everywhere = torch.arange(2 * 40 * 60)
     view = everywhere // (40 * 60)
-    _, _, behind, whole = source.pixels.read(everywhere, view, torch.ones(2, 3), torch.rand(4800, 3), source.edges)
+    _, _, behind, whole = source.read(everywhere, view, torch.ones(2, 3), torch.rand(4800, 3))
     behind, whole = behind.unflatten(0, (2, 40, 60)), whole.unflatten(0, (2, 40, 60))
     assert whole[0].equal(whole[1]) and whole[0, :, :29].sum() > 50 and whole[0, :, 30:].sum() > 50
     green, grey = torch.tensor([0, 200, 100]) / 255, torch.full((3,), 51 / 255)
@@ -336,7 +334,7 @@ def test_where_a_mask_has_to_say_the_edge_averages_are_of_the_object_alone(tmp_p
     codes = wall(brightness, object_colour=0.4)
     dataset = far(scene(tmp_path, np.stack([codes, codes])))
     source = source_of(dataset, averaging(dataset, 3, edge_pixels=edge_pixels))
-    average = source.pixels.codes.view(2, 40, 60, 4)[0].int() & 0xFFFF
+    average = source.codes.view(2, 40, 60, 4)[0].int() & 0xFFFF
     partly = (average[..., 3] > 0) & (average[..., 3] < 65535)
     assert len(source.edges.behind) == 0 and partly.sum() > 40
     assert (average[partly][:, :3] - round(0.4 * 255) * 257).abs().max() <= 1

@@ -279,7 +279,7 @@ def test_pixels_are_found_by_their_numbers(tmp_path, dtype):
     expected = np.stack([band(image[..., 3], 2)[0] for image in images])
     index = torch.randperm(4 * 40 * 60, generator=generator())
     view, random = index // (40 * 60), torch.rand(len(index), 3)
-    _, _, behind, whole = source.pixels.read(index, view, torch.ones(4, 3), random, source.edges)
+    _, _, behind, whole = source.read(index, view, torch.ones(4, 3), random)
     assert np.array_equal(whole.numpy(), expected.ravel()[index.numpy()])
     assert len(source.edges.behind) == expected.sum() > 0
     torch.testing.assert_close(behind[whole], (torch.tensor(grey)[view] / 255)[whole, None].expand(-1, 3))

@@ -15,7 +15,7 @@ from torch import Tensor
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.lens import pixel_width
-from splitnerf.data.pixels import Photos, ask_for, at_unit_exposure, averaged_codes, decoded, file_of
+from splitnerf.data.pixels import ask_for, at_unit_exposure, averaged_codes, decoded
 from splitnerf.errors import note
 from splitnerf.memory import give_back
 from splitnerf.ops.rays import EdgeRuns, PixelList, draw_rays, read_pixels
@@ -32,10 +32,6 @@ def training_photos(dataset: Dataset, config: Config) -> Dataset:
     A pixel of an average is the mean of its block in linear light, as in a smaller photo, also along the masks' edges.
     Detail finer than the fields' cells is noise to them; the mean of a block has less of it than a pixel, at the same
     cost of a step.
-
-    Args:
-        dataset: The train split.
-        config: The run's settings.
     """
     factor = averaging_factor(dataset, config)
     if factor == 1:
@@ -192,34 +188,6 @@ def runs_of(mask: Tensor) -> tuple[np.ndarray, np.ndarray]:
 HULL_EDGE = 400  # pixels, about, along the shorter edge of the masks that make the hull
 
 
-class PixelReader:
-    """Reads single pixels of photos, on a device to which their numbers are copied.
-
-    Args:
-        photos: The photos.
-        device: The device.
-    """
-
-    def __init__(self, photos: Photos, device: torch.device):
-        codes = photos.codes
-        self.file = file_of(codes) if device.type == "cpu" else None
-        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # of which torch has more operations
-        self.codes = torch.from_numpy(codes).to(device).view(-1, 4)
-
-    def __len__(self) -> int:
-        return len(self.codes)
-
-    def read(
-        self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor, edges: EdgeRuns
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.rays.read_pixels`."""
-        if self.file is not None:
-            size = 4 * self.codes.element_size()
-            for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
-                ask_for(self.file, page * mmap.PAGESIZE, size)
-        return read_pixels(self.codes, index, view, exposures, backgrounds, edges)
-
-
 class PixelSource:
     """Draws training rays: most of them near the objects' masks, the rest anywhere.
 
@@ -230,6 +198,7 @@ class PixelSource:
         edge_pixels: The width on each side of the masks' edges in pixels of `edges`; 0: none.
 
     Attributes:
+        codes: [pixels, 4] the numbers of all photos' pixels, one photo after the other.
         edges: The pixels along the masks' edges; none where the photos have no colours outside.
         turns: [views, 3, 3] the rotations of the photos' light, see :class:`splitnerf.data.dataset.Dataset`, or None.
         foreground, known: The valid pixels near a mask, and all valid pixels.
@@ -240,7 +209,9 @@ class PixelSource:
     def __init__(self, dataset: Dataset, foreground_share: float, generator: torch.Generator, edge_pixels: int = 0):
         self.device = generator.device
         self.poses, self.intrinsics = (torch.from_numpy(x).to(self.device) for x in (dataset.poses, dataset.intrinsics))
-        self.pixels = PixelReader(dataset.images, self.device)
+        codes, self._file = dataset.images.codes, dataset.images.file if self.device.type == "cpu" else None
+        codes = codes.view(np.int16) if codes.dtype == np.uint16 else codes  # of which torch has more operations
+        self.codes = torch.from_numpy(codes).to(self.device).view(-1, 4)
         self.turns = None if dataset.light_turns is None else torch.from_numpy(dataset.light_turns).to(self.device)
         self.matrices, self.origins = pixel_matrix(self.poses, self.intrinsics), self.poses[:, :3, 3].contiguous()
         self.height, self.width = dataset.height, dataset.width
@@ -283,7 +254,6 @@ class PixelSource:
         """Draws n rays, see :func:`splitnerf.ops.rays.draw_rays`: the first seven of :class:`Batch`, the photos as they are.
 
         Args:
-            n: The number of rays.
             random: [n] in [0, 1); None: drawn by the generator.
             backgrounds: [n, 3] sRGB colours behind the pixels that are not at edges; None: black.
             exposures: [views, 3] the photos' factors; None: 1.
@@ -296,8 +266,18 @@ class PixelSource:
         rays_o, rays_d, view, index = draw_rays(
             random, n_near, self.foreground, self.known, self.matrices, self.origins, self.height, self.width
         )
-        pixels, *beside = self.pixels.read(index, view, exposures, backgrounds, self.edges)
+        pixels, *beside = self.read(index, view, exposures, backgrounds)
         return rays_o, rays_d, pixels, view, *beside
+
+    def read(
+        self, index: Tensor, view: Tensor, exposures: Tensor, backgrounds: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What the photos show at pixels, as they are; see :func:`splitnerf.ops.rays.read_pixels`."""
+        if self._file is not None:
+            size = 4 * self.codes.element_size()
+            for page in np.unique(index.numpy() * size // mmap.PAGESIZE).tolist():
+                ask_for(self._file, page * mmap.PAGESIZE, size)
+        return read_pixels(self.codes, index, view, exposures, backgrounds, self.edges)
 
 
 class Batch(NamedTuple):

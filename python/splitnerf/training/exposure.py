@@ -14,9 +14,8 @@ from splitnerf.ops.shading import srgb_to_linear
 KEEP = 0.998  # share of the sums that outlives a step
 ENOUGH = 50.0  # pixels of a photo that count as much as the start
 DARKEST, BRIGHTEST = 0.01, 0.95  # linear values of a photo's pixels that count
-ERROR = (
-    0.06  # of the logarithms, as the rendering is not the object: measured 0.05 on two captures with known exposures
-)
+# Of the logarithms, as the rendering is not the object: measured 0.05 on two captures with known exposures.
+ERROR = 0.06
 COLOUR_ERROR = 0.02  # of each channel's difference from their mean: measured 0.009 on a capture of one white balance
 FARTHEST = 1.0  # of a pixel's log from the rendering's: more is no exposure
 COVERED = 0.95  # alpha and opacity of pixels that count

@@ -63,9 +63,7 @@ def explain_loss(step: int, terms: dict[str, float], model: SceneModel, batch: B
     """The error for a loss that is not finite: it names the terms and, in order of the data flow, the first bad input.
 
     Args:
-        step: The number of the step.
         terms: The values of the loss's terms by name.
-        model: The scene.
         batch, ray: The rays of the step, and their rendering; of one that is read late, those of a step after it, which
             nothing has moved.
     """

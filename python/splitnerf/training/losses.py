@@ -64,18 +64,15 @@ class Terms(dict[str, Term]):
     def backward(self) -> None:
         """Takes the gradients of the weighted sum. The weights seed the backward pass, so that the sum itself is never
         computed."""
-        roots = [(values, _seed(weights, values)) for values, weights in self._roots if values.requires_grad]
-        torch.autograd.backward(*map(list, zip(*roots)))
+        roots = [(values, weights) for values, weights in self._roots if values.requires_grad]
+        seeds = [_stored_seed(weights, values.shape, values.device) for values, weights in roots]
+        torch.autograd.backward([values for values, _ in roots], seeds)
 
 
 @functools.lru_cache(maxsize=1024)
 def _stored_seed(weights: tuple[float, ...], shape: torch.Size, device: torch.device) -> Tensor:
     with torch.inference_mode(False):
         return pinned(torch.tensor(weights).reshape(shape), device).to(device, non_blocking=True)
-
-
-def _seed(weights: tuple[float, ...], values: Tensor) -> Tensor:
-    return _stored_seed(weights, values.shape, values.device)
 
 
 def loss_terms(
@@ -93,8 +90,7 @@ def loss_terms(
     """The terms of the loss by name; the colour's term comes first.
 
     Args:
-        model, light: The scene, and its evaluated light.
-        batch, ray: The rays, and their rendering.
+        ray: The rendering of the batch.
         scene: The surface as a mesh; None before the first mesh.
         environment: [h, 2h, 3] linear radiance that weighs the traced occlusion; None: no occlusion is traced.
         generator: Random numbers for the losses' subsets.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Future
 from typing import NamedTuple
 
@@ -139,7 +138,8 @@ def make_mesh(model: SceneModel, network: SdfNetwork, aims: Tensor | None) -> Tr
     """The zero level set of a field, traced in directions `aims` [k, 3]; None where it is empty. Only constants of the
     model are read. Raises RuntimeError where the field is not finite."""
     try:
-        vertices, faces = extract_mesh(distances(network), model.config.constants.box, model.config.mesh.resolution)
+        sdf = lambda points: sdf_values(points.to(network.table.device), network).cpu()  # noqa: E731
+        vertices, faces = extract_mesh(sdf, model.config.constants.box, model.config.mesh.resolution)
     except EmptyMesh:
         return None
     return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces), aims)
@@ -156,8 +156,3 @@ def traced(model: SceneModel, vertices: Tensor, faces: Tensor, aims: Tensor | No
     """A mesh with its visibility in directions `aims`, where the model caches that."""
     scene = MeshScene(vertices.numpy(), faces.numpy())
     return TracedMesh(scene, vertices, faces, model.trace(scene, vertices, faces, aims))
-
-
-def distances(network: SdfNetwork) -> Callable[[Tensor], Tensor]:
-    """The field, on any device, as a function from points [n, 3] to distances [n], both on the CPU."""
-    return lambda points: sdf_values(points.to(network.table.device), network).cpu()

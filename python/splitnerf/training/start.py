@@ -118,9 +118,7 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
     outlines carve. So do objects that fill most of their hull. In between, as inside of metal, the shape is not sure.
 
     Args:
-        photos: The photos of the training.
-        hull: [r, r, r] bool, the visual hull.
-        config: The run's settings.
+        hull: [r, r, r] bool, the visual hull of the training's photos.
     """
     if not hull.any():
         return None

@@ -161,7 +161,6 @@ class Step:
         """Takes the gradients of a batch and moves the parameters, those of the light where its turn has come.
 
         Args:
-            batch: The rays.
             light: The evaluated light; of no use any more where its parameters moved.
             step, progress: The number of the step, and the training's progress in [0, 1].
 
