@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.environment import resize_environment
+from splitnerf.data.environment import directions_of_texels, resize_environment
 from splitnerf.data.images import linear_to_srgb
 from splitnerf.data.truth import ViewTruth
 from splitnerf.evaluate import metrics
@@ -61,10 +61,11 @@ def test_what_is_no_more_than_the_threshold_is_no_metal():
     assert metrics.balanced_accuracy(np.array([0.5, 0.6]), np.array([0.5, 0.6])) == 1.0
 
 
-def test_solid_angle_weights():
+def test_solid_angles_of_rows():
     # Two rows, hemispheres of equal size; four rows: (1 - cos 45) / 2 at the poles.
-    assert metrics.solid_angle_weights(2) == pytest.approx([0.5, 0.5])
-    assert metrics.solid_angle_weights(4)[0] == pytest.approx((1 - np.sqrt(0.5)) / 2)
+    of_rows = [directions_of_texels(n)[1].sum(axis=1) / (4 * np.pi) for n in (2, 4)]
+    assert of_rows[0] == pytest.approx([0.5, 0.5])
+    assert of_rows[1][0] == pytest.approx((1 - np.sqrt(0.5)) / 2)
 
 
 def test_light_psnr_ignores_a_scale_per_channel_and_resolution():
@@ -75,7 +76,7 @@ def test_light_psnr_ignores_a_scale_per_channel_and_resolution():
 
 def test_light_psnr_is_judged_up_to_the_99th_percentile_of_the_truth():
     """A lamp on less than a hundredth of the map counts as white, however bright; half of it is white as well."""
-    weights = np.repeat(metrics.solid_angle_weights(128), 256).reshape(128, 256)
+    weights = directions_of_texels(128)[1]
     truth, light = np.ones((128, 256, 3)), np.ones((128, 256, 3))
     truth[60:64, :40], light[60:64, :40] = 3.0, 2.0  # 160 of 32,768 texels
     light[:30] = 0.5

@@ -7,6 +7,7 @@ whole run, from 0 to 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from splitnerf.config.setting import setting
 from splitnerf.data.reading import EVAL_MODES, MASK_KINDS
@@ -254,9 +255,7 @@ class ExportSettings:
     )
 
 
-def number(default: float | int | str, **limits: object) -> float | int | str:
-    """A constant, which its name describes."""
-    return setting(default, "", **limits)
+number = partial(setting, meaning="")  # a constant, which its name describes
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from splitnerf.evaluate.score_table import value_at
+
 
 @dataclass(frozen=True)
 class Score:
@@ -43,9 +45,7 @@ def graded(evaluation: Mapping) -> list[dict]:
     """For each score that is there: `name`, `place`, `value` and `word` (good, fair or poor), and `scale`, where the words begin."""
     rows = []
     for score in SCORES:
-        value = evaluation
-        for key in score.place:
-            value = (value or {}).get(key)
+        value = value_at(evaluation, score.place)
         if value is None:
             continue
         sign = 1 if score.good > score.poor else -1

@@ -7,7 +7,7 @@ import trimesh
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
-from splitnerf.data.environment import resize_environment
+from splitnerf.data.environment import directions_of_texels, resize_environment
 
 MSE_FLOOR = 1e-10
 LIGHT_SIZE = (128, 256)
@@ -86,17 +86,11 @@ def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
     truth's 99th percentile and clipped to [0, 1]; pixels weigh by their solid angle.
     """
     x, y = (resize_environment(image, *LIGHT_SIZE).reshape(-1, 3).astype(np.float64) for image in (light, truth))
-    weights = np.repeat(solid_angle_weights(LIGHT_SIZE[0]), LIGHT_SIZE[1])
+    weights = directions_of_texels(LIGHT_SIZE[0])[1].ravel()
     white = max(np.percentile(y, 99), 1e-8)
     x, y = (np.clip(image / white, 0, 1) for image in (x * lsq_scale(x, y, weights), y))
     mse = np.average(((x - y) ** 2).mean(axis=1), weights=weights)
     return float(-10 * np.log10(max(mse, MSE_FLOOR)))
-
-
-def solid_angle_weights(height: int) -> np.ndarray:
-    """The share of the sphere's solid angle of each row of an equirectangular map, [height] float64, sum 1."""
-    edges = np.cos(np.linspace(0, np.pi, height + 1))
-    return (edges[:-1] - edges[1:]) / 2
 
 
 def mesh_distances(mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES) -> tuple[float, float]:

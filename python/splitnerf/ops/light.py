@@ -66,7 +66,6 @@ def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int =
         axes: [s, 3] unit axes of the lobes.
         roughness: [s, 1] perceptual roughness in [0, 1].
         n_samples: The number of directions per axis.
-        seed: The seed of the random shifts.
 
     Returns:
         [s, n_samples, 3] unit directions.
@@ -267,10 +266,6 @@ def light_lookup(
     return lib.light_lookup(directions, roughness, levels, sh, resolutions, nodes, zonal)
 
 
-def _keep_map(ctx, inputs, output):
-    ctx.save_for_backward(*inputs[:10])
-
-
 def _map_backward(ctx, grad):
     refuse_gradients(ctx, "sparse_product", weights=2, transposed_weights=7)
     rows, transposed = ctx.saved_tensors[:5], ctx.saved_tensors[5:]
@@ -280,7 +275,7 @@ def _map_backward(ctx, grad):
 register(
     "sparse_product",
     fake=lambda *inputs: inputs[10].new_empty(inputs[3].numel(), 3),
-    setup_context=_keep_map,
+    setup_context=lambda ctx, inputs, output: ctx.save_for_backward(*inputs[:10]),
     backward=_map_backward,
 )
 register(

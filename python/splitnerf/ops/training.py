@@ -97,8 +97,8 @@ def quadratic_entropy(x: Tensor) -> Tensor:
     return lib.quadratic_entropy(x)[0]
 
 
-def _keep_inputs_and_total(ctx, inputs, output):
-    """Saves the inputs and the sum of weights, to which there is no gradient."""
+def _keep_with_second(ctx, inputs, output):
+    """Saves the inputs and the second result, to which there is no gradient."""
     ctx.mark_non_differentiable(output[1])
     ctx.set_materialize_grads(False)  # else zeros are made for it
     ctx.save_for_backward(*inputs, output[1])
@@ -107,12 +107,6 @@ def _keep_inputs_and_total(ctx, inputs, output):
 def _gradient_backward(ctx, grad, _):
     refuse_gradients(ctx, "gradient_losses", weights=1)
     return None if grad is None else lib.gradient_losses_backward(*ctx.saved_tensors, grad), None, None
-
-
-def _keep_gradient(ctx, inputs, output):
-    ctx.mark_non_differentiable(output[1])
-    ctx.set_materialize_grads(False)  # else zeros are made for it
-    ctx.save_for_backward(output[1], *inputs)
 
 
 class _FirstOnly(torch.autograd.Function):
@@ -128,21 +122,22 @@ class _FirstOnly(torch.autograd.Function):
 
 
 def _entropy_backward(ctx, grad, _):
-    return None if grad is None else _FirstOnly.apply(ctx.saved_tensors[0] * grad, ctx.saved_tensors[1])
+    x, gradient = ctx.saved_tensors
+    return None if grad is None else _FirstOnly.apply(gradient * grad, x)
 
 
 register("pixel_losses", fake=lambda mean, *rest: mean.new_empty(2), gradients="mean opacity")
 register(
     "gradient_losses",
     fake=lambda gradients, *rest: (gradients.new_empty(2), gradients.new_empty(())),
-    setup_context=_keep_inputs_and_total,
+    setup_context=_keep_with_second,
     backward=_gradient_backward,
 )
 register("gradient_losses_backward", fake=lambda gradients, *rest: gradients.new_empty(gradients.shape))
 register(
     "quadratic_entropy",
     fake=lambda x: (x.new_empty(()), x.new_empty(x.shape)),
-    setup_context=_keep_gradient,
+    setup_context=_keep_with_second,
     backward=_entropy_backward,
 )
 

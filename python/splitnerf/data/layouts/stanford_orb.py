@@ -7,7 +7,6 @@ train_mask/0000.png, test_mask/...            white is the object
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from splitnerf.data.layouts import transforms
@@ -24,12 +23,8 @@ splits = transforms.splits
 
 def read(root: Path, split: str | None) -> list[Frame]:
     """The frames of a split, or all. Raises InputError where a file is missing or cannot be used."""
-    return [with_mask(frame) for frame in transforms.read(root, split)]
-
-
-def with_mask(frame: Frame) -> Frame:
-    """The frame with the mask that lies in the folder beside its photo's."""
-    image = frame.image_path
-    return replace(
-        frame, mask_path=image.parent.with_name(f"{image.parent.name}_mask") / f"{image.stem}.png", mask_kind="object"
-    )
+    frames = transforms.read(root, split)
+    for frame in frames:
+        folder, name = frame.image_path.parent, f"{frame.image_path.stem}.png"
+        frame.mask_path, frame.mask_kind = folder.with_name(f"{folder.name}_mask") / name, "object"
+    return frames
