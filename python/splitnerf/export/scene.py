@@ -187,13 +187,8 @@ def write_mesh_ply(path: Path, mesh: trimesh.Trimesh, albedo: np.ndarray | None 
 
 
 def write_environment(folder: Path, radiance: np.ndarray) -> None:
-    """Writes `environment.exr` (half where the range allows, else float) and `environment.hdr`.
-
-    Args:
-        folder: The run's folder.
-        radiance: [H, W, 3] linear radiance, finite and >= 0, equirectangular: u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from
-            the top.
-    """
+    """Writes `environment.exr` (half where the range allows, else float) and `environment.hdr` of linear radiance [H, W, 3],
+    finite and >= 0, equirectangular: u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top."""
     half = bool(radiance.max() <= np.finfo(np.float16).max)
     write_image(folder / "environment.exr", radiance, half=half)
     write_image(folder / "environment.hdr", radiance)

@@ -9,8 +9,8 @@ import fast_simplification
 import numpy as np
 import trimesh
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
+from trimesh.graph import connected_component_labels
 
 MIN_COMPONENT = 0.01  # share of the largest component's faces
 # The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
@@ -24,10 +24,7 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
     Returns:
         vertices [n, 3], outward faces [m, 3] and the number of removed components.
     """
-    n = len(vertices)
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
+    label = connected_component_labels(np.concatenate([faces[:, :2], faces[:, 1:]]), len(vertices))
     count = np.bincount(label[faces[:, 0]], minlength=label.max() + 1)
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     volume = np.bincount(label[faces[:, 0]], (a * np.cross(b, c)).sum(axis=1) / 6.0, minlength=len(count))
@@ -43,10 +40,10 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[n
     Returns:
         vertices [n, 3], and [n] bool, those that stay.
     """
-    n, edges = len(vertices), np.concatenate([faces[:, :2], faces[:, 1:], faces[:, [2, 0]]])
+    n, edges = len(vertices), trimesh.geometry.faces_to_edges(faces)
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
     links = links.maximum(links.T)  # the rim of a mesh that is not closed
-    _, component = connected_components(links, directed=False)
+    component = connected_component_labels(edges, n)
     free = ~seen & np.isin(component, component[seen])
     if not free.any():
         return vertices, ~free
@@ -101,10 +98,10 @@ def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
         (start[one], np.where(same_way, start[other], end[other])),
         (end[one], np.where(same_way, end[other], start[other])),
     ]
-    links = np.concatenate([np.stack(pair) for pair in joined], axis=1)
-    graph = coo_matrix((np.ones(links.shape[1], bool), tuple(links)), shape=(vertex.size, vertex.size))
-    _, fan = connected_components(graph, directed=False)
-    _, first, renumbered = np.unique(fan, return_index=True, return_inverse=True)
+    links = np.concatenate([np.stack(pair, axis=1) for pair in joined])
+    _, first, renumbered = np.unique(
+        connected_component_labels(links, vertex.size), return_index=True, return_inverse=True
+    )
     return vertices[vertex[first]], renumbered.reshape(-1, 3).astype(np.int32)
 
 

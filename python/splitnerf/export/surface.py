@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 CHUNK = 1 << 15  # points evaluated at a time
 STEPS = 4  # steps along a line, each with one evaluation of the field
@@ -29,7 +30,7 @@ class Surface:
 @torch.no_grad()
 def surface_normals(surface: Surface, points: np.ndarray) -> np.ndarray:
     """Unit gradients [n, 3] float32 of the field at [n, 3] points; 0 where it has none."""
-    rows = [_unit(surface.gradient(chunk)[1]) for chunk in torch.from_numpy(points).split(CHUNK)]
+    rows = [F.normalize(surface.gradient(chunk)[1], dim=1) for chunk in torch.from_numpy(points).split(CHUNK)]
     return torch.cat(rows).numpy()
 
 
@@ -58,7 +59,8 @@ def to_level_set(
     moved = []
     for rows in (slice(start, start + CHUNK) for start in range(0, len(points), CHUNK)):
         chunk = torch.from_numpy(points[rows])
-        along = _unit(surface.gradient(chunk)[1]) if directions is None else torch.from_numpy(directions[rows])
+        given = None if directions is None else torch.from_numpy(directions[rows])
+        along = F.normalize(surface.gradient(chunk)[1], dim=1) if given is None else given
         moved.append(_along_lines(surface.sdf, chunk, along, reach))
     return torch.cat(moved).numpy()
 
@@ -79,7 +81,3 @@ def _along_lines(sdf: Callable[[Tensor], Tensor], points: Tensor, directions: Te
         t_next = (t - f / slope.clamp(min=MIN_SLOPE)).clamp(-reach, reach)
         t_last, f_last, t = t, f, torch.where(slope > MIN_SLOPE, t_next, t)
     return points + best_t[:, None] * directions
-
-
-def _unit(vectors: Tensor) -> Tensor:
-    return torch.nn.functional.normalize(vectors, dim=1)

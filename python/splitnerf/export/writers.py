@@ -207,7 +207,13 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
         st.Set(Vt.Vec2fArray.FromNumpy((asset.uv * [1, -1] + [0, 1]).astype(np.float32)))
 
     material = UsdShade.Material.Define(stage, root.GetPath().AppendChild("material"))
-    surface = _shader(stage, material, "surface", "UsdPreviewSurface")
+
+    def shader(name: str, kind: str) -> UsdShade.Shader:
+        made = UsdShade.Shader.Define(stage, material.GetPath().AppendChild(name))
+        made.CreateIdAttr(kind)
+        return made
+
+    surface = shader("surface", "UsdPreviewSurface")
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     types, factors = Sdf.ValueTypeNames, asset.materials[0]
     inputs = {"diffuseColor": types.Color3f, "normal": types.Normal3f}
@@ -215,7 +221,7 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
     surface.CreateInput("diffuseColor", types.Color3f).Set(Gf.Vec3f(*factors.albedo))
     surface.CreateInput("roughness", types.Float).Set(float(factors.roughness))
     surface.CreateInput("metallic", types.Float).Set(float(factors.metallic))
-    coordinates = _shader(stage, material, "uv", "UsdPrimvarReader_float2")
+    coordinates = shader("uv", "UsdPrimvarReader_float2")
     coordinates.CreateInput("varname", types.String).Set("st")
     for name, pixels, space, uses in (
         ("albedo", maps.albedo, "sRGB", {"diffuseColor": "rgb"}),
@@ -226,7 +232,7 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
             continue
         file = folder / "textures" / f"{name}.png"
         write_image(file, pixels / np.float32(255))
-        texture = _shader(stage, material, name, "UsdUVTexture")
+        texture = shader(name, "UsdUVTexture")
         texture.CreateInput("file", types.Asset).Set(f"./textures/{name}.png")
         texture.CreateInput("sourceColorSpace", types.Token).Set(space)
         texture.CreateInput("st", types.Float2).ConnectToSource(coordinates.ConnectableAPI(), "result")
@@ -237,14 +243,6 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
             texture.CreateOutput(channels, types.Float3 if channels == "rgb" else types.Float)
             surface.CreateInput(use, inputs[use]).ConnectToSource(texture.ConnectableAPI(), channels)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-
-
-def _shader(stage: object, material: object, name: str, kind: str) -> object:
-    from pxr import UsdShade
-
-    shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild(name))
-    shader.CreateIdAttr(kind)
-    return shader
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation
-from scipy.sparse import csr_matrix, diags, identity, kron, vstack
+from scipy.sparse import csr_matrix, identity, kron, vstack
+from scipy.sparse.csgraph import laplacian
 from scipy.sparse.linalg import cg
+from trimesh.geometry import faces_to_edges
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
@@ -67,7 +69,6 @@ def slopes(mesh: Mesh, pixels: Pixels, shape: tuple[int, int]) -> csr_matrix:
     """The derivatives [n, 3 m] of the coverage of n pixels by the coordinates of m vertices.
 
     Args:
-        mesh: The mesh.
         pixels: In the order of their photos.
         shape: Height and width of a photo.
     """
@@ -84,10 +85,9 @@ def slopes(mesh: Mesh, pixels: Pixels, shape: tuple[int, int]) -> csr_matrix:
 
 def smoothness(faces: np.ndarray, n_vertices: int) -> csr_matrix:
     """[m, m] the graph Laplacian of a mesh."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = faces_to_edges(faces)
     joined = csr_matrix((np.ones(len(edges)), edges.T), shape=(n_vertices, n_vertices))
-    joined = ((joined + joined.T) > 0).astype(np.float64)
-    return diags(np.asarray(joined.sum(1)).ravel()) - joined
+    return laplacian(((joined + joined.T) > 0).astype(np.float64)).tocsr()
 
 
 def fit_outline(

@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from torch import Tensor
 from torch.nn import functional as F
+from trimesh.graph import connected_component_labels
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
@@ -120,8 +119,7 @@ class AssetTexels:
 
     def maps(self, values: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Textures of values [m, 8]: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
-        image = self.spread(values)
-        return tuple(part.contiguous() for part in image.split([3, 2, 3], dim=2))
+        return tuple(part.contiguous() for part in self.spread(values).split([3, 2, 3], dim=2))
 
     def asset_with(self, maps: tuple[Tensor, Tensor, Tensor]) -> Asset:
         """The asset with other textures, see :meth:`maps`."""
@@ -187,9 +185,8 @@ def check_form(asset: Asset) -> None:
 
 def charts(asset: Asset) -> np.ndarray:
     """[n] the number of the chart that each vertex belongs to; charts share no vertices."""
-    faces, n = asset.triangles, len(asset.vertices)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    return connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n)), directed=False)[1]
+    edges = np.concatenate([asset.triangles[:, :2], asset.triangles[:, 1:]])
+    return connected_component_labels(edges, len(asset.vertices))
 
 
 def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) -> np.ndarray:
