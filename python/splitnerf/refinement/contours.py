@@ -86,14 +86,8 @@ def projected(points: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
 
 
 def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]) -> Pieces:
-    """The pieces of edges that bound the mesh's image in a photo.
-
-    Args:
-        mesh: The mesh.
-        pixels: Holds the cameras.
-        view: The number of the photo.
-        shape: Height and width of the photo.
-    """
+    """The pieces of edges that bound the mesh's image in the photo `view`, whose height and width are `shape`; `pixels`
+    holds the cameras."""
     pose, intrinsics = pixels.poses[view].astype(np.float64), pixels.intrinsics[view].astype(np.float64)
     edges, front = mesh.edges, (mesh.normals * (pose[:, 3] - mesh.points)).sum(axis=1) > 0
     turns = front[edges.triangles[:, 0]] != front[edges.triangles[:, 1]]
@@ -136,13 +130,11 @@ def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]
 
 
 def coverage_slopes(pieces: Pieces, number: np.ndarray, n_vertices: int, window: PixelFilter) -> csr_matrix:
-    """The derivatives [pixels, 3 m] of the coverage of a photo's pixels by the vertices' coordinates.
+    """The derivatives [pixels, 3 m] of the coverage of a photo's pixels by the coordinates of `n_vertices` m.
 
     Args:
         pieces: The outline in the photo.
         number: [H, W] int64 the row of each pixel, -1 where there is none; the rows are 0 to number.max().
-        n_vertices: m.
-        window: The pixels' filter.
     """
     height, width = number.shape
     around = np.arange(window.WIDTH) - window.WIDTH // 2  # from its own pixel to those whose windows hold a piece

@@ -62,8 +62,7 @@ def sum_of_levels(levels: list[Tensor]) -> Tensor:
 
 
 def footprints(height: int, directions: Tensor) -> tuple[Tensor, Tensor]:
-    """The four texels [n, 4], row * width + column, around directions [n, 3] of a map [h, 2 h], and their shares [n,
-    4]."""
+    """The four texels [n, 4], row * width + column, around directions [n, 3] of a map [h, 2 h], and their shares [n, 4]."""
     width = 2 * height
     u = 0.5 - torch.atan2(directions[:, 1], directions[:, 0]) / (2 * math.pi)
     v = torch.atan2(directions[:, :2].norm(dim=1), directions[:, 2]) / math.pi

@@ -76,7 +76,6 @@ class LightEquations:
         """Adds a batch of n rays.
 
         Args:
-            rows: Their dependence on the light.
             sky: [n, k, 3] the light's radiance in their directions.
             residual: [n, 3] predicted minus observed colours, their noise independent of the slopes'.
         """
@@ -122,11 +121,8 @@ class LightEquations:
 
     @torch.no_grad()
     def step(self, share: float) -> float:
-        """Moves the light by a share of the Gauss-Newton step and forgets the observations.
-
-        Returns:
-            The root mean square of the change of log radiance.
-        """
+        """Moves the light by a share of the Gauss-Newton step and forgets the observations; returns the root mean square of
+        the change of log radiance."""
         rows = Rows(*(torch.cat(part) for part in zip(*self.rows)))
         n, k, _ = rows.slopes.shape
         radiance = self.light.radiance().view(-1, 3)

@@ -81,7 +81,6 @@ class NormalEquations:
 
     Args:
         start: [m, n] unknowns at the start.
-        prior: The prior.
         keep: The share of the sums that is kept after a step, in [0, 1). They are carried to the new unknowns as if the
             photos were linear functions of them.
     """
@@ -115,13 +114,9 @@ class NormalEquations:
     @torch.no_grad()
     def step(self, unknowns: Tensor, like: Tensor, n_iterations: int = 20) -> Tensor:
         """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares.
+        `like` [m, n] are the values of similar texels, NaN where there are none.
 
         Source: Nocedal and Wright 2006, section 10.3.
-
-        Args:
-            unknowns: The unknowns.
-            like: [m, n] the values of similar texels, NaN where there are none.
-            n_iterations: The number of conjugate gradients.
         """
         prior = self.prior
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown

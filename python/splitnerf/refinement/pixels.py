@@ -48,15 +48,8 @@ class Pixels:
         return len(self.view)
 
     def rays(self, index: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rays through pixels.
-
-        Args:
-            index: [k] pixels.
-            offsets: [k, s, 2] offsets from the pixels' centres in pixels.
-
-        Returns:
-            origins and unit directions, [k, s, 3] float32 each, world frame.
-        """
+        """Rays through pixels [k], at offsets [k, s, 2] from their centres in pixels: origins and unit directions, [k, s, 3]
+        float32 each, world frame."""
         return self.rays_through(self.view[index], self.centre[index, None] + offsets)
 
     def rays_through(self, view: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,7 +68,6 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int) 
     """Pixels of a split, photo by photo.
 
     Args:
-        dataset: The split.
         choose: Returns the pixels [H, W] bool to take from the photo of a number.
         most: The number of pixels, about, beyond which a random share of them is taken: a pixel takes 43 bytes.
     """

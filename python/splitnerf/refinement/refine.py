@@ -7,7 +7,6 @@ import dataclasses
 import hashlib
 import math
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -138,10 +137,8 @@ def refine_folder(
 
     Args:
         source: The folder of mesh.glb and environment.exr.
-        dataset: The photos.
         out: The folder of the results: mesh.glb, environment.exr and .hdr, and refinement.json. The state of
             an unfinished refinement stands there; the caller deletes it (:func:`forget_state`) once all is done.
-        settings: What the fit does.
         resume: Whether to continue from that state, if there is one.
         save_minutes: The time between two saves of the state.
 
@@ -156,8 +153,16 @@ def refine_folder(
     asset, light = read_source(source)
     out.mkdir(parents=True, exist_ok=True)
     kept = StateFile(out, origin_of(source, dataset, settings), save_minutes)
+    state = kept.load() if resume else None
     with Progress(0.0, leave=False, at_once=True) as bar:
-        stage = begin(dataset, asset, light, settings, kept.load() if resume else None, kept.path, bar.show)
+        try:
+            stage = Stage(dataset, asset, light, settings, state, bar.show)
+        except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
+            if state is None:
+                raise
+            raise OtherState(
+                f"{kept.path}: not the state of this refinement ({error}); delete it to begin anew"
+            ) from error
     with Interrupt() as interrupt:
         complete = True
         kept.take(stage)
@@ -218,31 +223,12 @@ def with_normal_texture(asset: Asset) -> Asset:
     )
 
 
-def begin(
-    dataset: Dataset,
-    asset: Asset,
-    light: np.ndarray,
-    settings: FitSettings,
-    state: dict | None,
-    path: Path,
-    show: Callable[[float, str], None],
-) -> Stage:
-    """A new refinement, or one that continues from the state in the file `path`. Raises InputError where it cannot."""
-    try:
-        return Stage(dataset, asset, light, settings, state, show)
-    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
-        if state is None:
-            raise
-        raise OtherState(f"{path}: not the state of this refinement ({error}); delete it to begin anew") from error
-
-
 def record_of(refined: Refined, seconds: float) -> dict:
     """The contents of refinement.json."""
-    lamp = None if refined.lamp is None else refined.lamp._asdict()
     return {
         "seconds": round(seconds, 1),
         "outline": refined.outline,
-        "lamp": lamp,
+        "lamp": None if refined.lamp is None else refined.lamp._asdict(),
         "level": refined.level,
         "saturated": refined.saturated,
         "held_out": list(refined.held),

@@ -53,7 +53,6 @@ def usual(values: Tensor, features: np.ndarray, n_kinds: int, random: np.random.
     Args:
         values: [m].
         features: [m, d], in units of the Gaussian's deviation.
-        n_kinds: The number of kinds.
         random: What draws the texels by which kinds and medians are found.
     """
     seen = random.permutation(len(features))[:N_SEEN]
