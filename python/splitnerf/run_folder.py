@@ -35,11 +35,9 @@ EXPORTED = (
 
 
 def check_run(run: Path, *, resume: bool, overwrite: bool) -> None:
-    """Checks that a run can be made here, and what stands where it is to be. Raises InputError where the folder holds a
-    run or a data set, the path is not a folder, or the machine has one processor."""
+    """Checks that a run can be made in a locked folder, and what stands where it is to be. Raises InputError where the
+    folder holds a run or a data set, or the machine has one processor."""
     refuse_one_processor()
-    if run.exists() and not run.is_dir():
-        raise InputError(f"{run}: is a file; give --out a folder")
     refuse_data(run)
     refuse_links(run)
     if not present_in(run) and any((run / PREVIEWS).glob("step_*.png")):

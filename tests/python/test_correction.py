@@ -127,7 +127,7 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     monkeypatch.setattr(model, "quadrature_correction", added)
     ray = render_rays(model, light, found, shades_per_ray=2)
     torch.testing.assert_close(ray.mean - without, torch.tensor([1.0, 0.0, 3.0])[:, None].expand(3, 3))
-    assert ray.samples.ray_indices[ray.shaded[asked["candidates"]]].tolist() == [0, 2]
+    assert found.packed.ray_indices[ray.shaded[asked["candidates"]]].tolist() == [0, 2]
     assert ray.sdf.abs().max() > 0.01
     torch.testing.assert_close(asked["on_surface"], ray.positions - ray.normals * ray.sdf[:, None])
 
@@ -186,7 +186,7 @@ def test_a_step_leaves_its_own_gradients_and_shades_and_probes_as_it_is_set():
         gradients.append(model.sdf_field.hidden_direction.grad.clone())
     torch.testing.assert_close(*gradients)
     n = len(ray.weights)
-    assert len(ray.beside) == 40 and len(ray.gradients) == n + 30 + 40
+    assert len(ray.found.beside) == 40 and len(ray.gradients) == n + 30 + 40
     assert len(ray.shaded) < 0.5 * n
     assert step.capacity.of_shading is None  # it has no limit
     entropies = []

@@ -114,7 +114,9 @@ def numbers_of(step: Step) -> StepNumbers:
     """The numbers of a step without terms and samples."""
     none = torch.zeros(0, dtype=torch.int64)
     ray = SimpleNamespace(
-        n_found=none.sum(), sizes=torch.zeros(3, dtype=torch.int64), evaluated=none, s=torch.ones(()), mean=none
+        found=SimpleNamespace(n_found=none.sum(), evaluated=none),
+        sizes=torch.zeros(3, dtype=torch.int64),
+        s=torch.ones(()),
     )
     return step.fetch(1, SimpleNamespace(target=none), ray, {}).read()
 

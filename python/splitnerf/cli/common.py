@@ -180,16 +180,12 @@ class Stages:
         print(f"stage {self._names.index(name) + 1} of {len(self._names)}: {name}{more}", file=sys.stderr, flush=True)
 
 
-def print_summary(
-    run: Path, evaluation: dict, step: int | None = None, seconds: float | None = None, device: str = "cpu"
-) -> None:
+def print_summary(run: Path, evaluation: dict, step: int, seconds: float, device: str = "cpu") -> None:
     """Prints the steps, the device and the memory, the errors against the truth in the data, and the path of the
     results."""
-    if step is not None and seconds is not None:
-        used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1024 if sys.platform == "linux" else 1)
-        print(
-            f"{step} steps in {seconds:.0f} s on the {'CPU' if device == 'cpu' else 'GPU'}, {used / 1e9:.1f} GB of memory"
-        )
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1024 if sys.platform == "linux" else 1)
+    processor = "CPU" if device == "cpu" else "GPU"
+    print(f"{step} steps in {seconds:.0f} s on the {processor}, {used / 1e9:.1f} GB of memory")
     print_refinement(evaluation.get("refinement"))
     print_scores(evaluation)
     print(f"results: {run / 'report.html'}, {run / 'mesh.glb'}, {run / 'environment.exr'}")

@@ -49,8 +49,6 @@ def run(args: argparse.Namespace) -> int:
     if not (args.run / "mesh.glb").is_file():
         refuse_no_run(args.run)
     out = args.out or args.run / REFINED
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; give --out a folder")
     if out.resolve() == source_of(args.run).resolve():
         raise InputError(f"{out}: holds the asset to refine, which this would replace; give another --out")
     check_results(out, args.run, overwrite=args.overwrite or (args.resume and (out / STATE).is_file()))

@@ -97,8 +97,6 @@ def look_at(centre: np.ndarray, azimuth: float, elevation: float, distance: floa
 def data_views(root: Path, split: str, size: tuple[int, int | None] | None, reading: Reading = Reading()) -> list[View]:
     """The cameras of a data set's split, in the data's world; each image's size is the default. Raises InputError where
     the data cannot be used, or the size has another shape than the images."""
-    if not root.is_dir():
-        raise InputError(f"{root}: no such folder; give the folder of a data set")
     frames, _ = read_frames(root, split, reading)
     views = []
     for frame in frames:

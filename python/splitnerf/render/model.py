@@ -107,9 +107,6 @@ def grid_spec(config: Config) -> HashGridSpec:
 class SceneModel(nn.Module):
     """All learned parts of a scene, and the visibility of its newest mesh.
 
-    Args:
-        config: The run's settings.
-
     Attributes:
         occlusion: The network of occlusion factors; None where they are cached, or there are none.
         cells: The cells of the sky towards which visibility is cached; None where it is not.
@@ -218,12 +215,10 @@ class SceneModel(nn.Module):
         """Outgoing radiance of points towards the camera.
 
         Args:
-            light: The evaluated light.
             positions: [n, 3], scene units.
             outputs, features: [n, 13] and [n, C], the SDF's outputs and hash features at the positions.
             normals, view_dirs: [n, 3] unit; view_dirs point to the camera.
-            segments: The ray segments of the points; the cached visibility is looked up once per segment. None: it is
-                looked up for every point.
+            segments: See :meth:`occlusion_at`.
 
         Source: SplitNeRF Eq. (6)-(10), (17).
         """
@@ -263,7 +258,6 @@ class SceneModel(nn.Module):
         from roughness 0.3 to 0.45. Narrower lobes are not corrected.
 
         Args:
-            light: The evaluated light.
             view_dirs: [n, 3] unit, to the camera.
             points: The result of :meth:`shade` for the points.
             candidates: [k] int64, the indices of points that may be corrected.

@@ -59,8 +59,7 @@ class AssetRenderer:
             environment: [h, w, 3] linear radiance >= 0, equirectangular, in Blender's convention.
             pose: [3 or 4, 4] camera-to-world, OpenGL axes.
             intrinsics: (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
-            width: Pixels.
-            height: Pixels.
+            width, height: Pixels.
             spp: Paths a pixel.
             bounces: Scattering events after the first one; 0 is direct light only.
             seed: The seed of the random numbers.

@@ -75,19 +75,16 @@ class RenderedRays:
     """The rendering of one batch of rays: n samples with the padding, of which n_shaded are shaded.
 
     Attributes:
-        mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1.
+        found: What was rendered.
+        mean: [n_rays, 3] colour of the object alone, un-premultiplied, not clipped above 1. With `shading.method = summed` it
+            contains the quadrature correction at each ray's heaviest sample, by the share of the weight that the sample's
+            segment carries.
         linear: Whether `mean` is linear; otherwise it is sRGB.
         opacity: [n_rays] in [0, 1].
         s: [] sharpness of the density, 1 / scene units.
-        samples: The packed samples.
-        evaluated, n_found: See :class:`FoundSamples`.
         weights: [n] rendering weights.
-        values: [n, 3] composited values: radiance of the split sum, linear or sRGB by the setting `compositing`. With
-            `shading.method = summed`, `mean` also contains the quadrature correction at each ray's heaviest sample, by
-            the share of the weight that the sample's segment carries.
         gradients: [n + k + m, 3] d sdf / d position at all samples and probes.
         anywhere: [k] signed distances at the probes that belong to no sample, scene units.
-        beside: [m] int64, the samples whose neighbours the last m gradients belong to.
         shaded: [n_shaded] int64, indices of the shaded samples.
         sizes: [3] int64, the numbers of shaded samples, of rays with samples and of ray segments.
         shares: [n_shaded] rendering weight that each shaded sample stands for, no gradient.
@@ -97,18 +94,14 @@ class RenderedRays:
         points: Materials, occlusion and radiance of the shaded samples.
     """
 
+    found: FoundSamples
     mean: Tensor
     linear: bool
     opacity: Tensor
     s: Tensor
-    samples: PackedSamples
-    evaluated: Tensor
-    n_found: Tensor
     weights: Tensor
-    values: Tensor
     gradients: Tensor
     anywhere: Tensor
-    beside: Tensor
     shaded: Tensor
     sizes: Tensor
     shares: Tensor
@@ -145,7 +138,6 @@ def find_samples(
     """Finds the samples of rays that contribute to their pixels, with the current field.
 
     Args:
-        model: The scene.
         cells: [r, r, r] uint8 cells of the occupancy grid.
         rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions.
         jitter: [n_rays] in [0, 1), offsets of the samples as shares of a sample's length.
@@ -244,8 +236,6 @@ def render_rays(
     """Renders rays from their samples.
 
     Args:
-        model: The scene.
-        light: The evaluated light.
         found: The samples; the field may have changed slightly since the search.
         shades_per_ray: The approximate number of shaded samples per ray; the values of the other samples are
             interpolated. 0 shades all.
@@ -280,26 +270,22 @@ def render_rays(
     turned = light if turns is None else light.turned(turns[samples.ray_indices.index_select(0, shaded)])
     points = model.shade(turned, positions, outputs, features, normals, view_dirs, segments)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
-    values, shares = spread.interpolate(radiance), spread.gather(weights.detach())
-    mean = composite(weights, values, samples.offsets, opacity, MIN_OPACITY)
+    shares = spread.gather(weights.detach())
+    mean = composite(weights, spread.interpolate(radiance), samples.offsets, opacity, MIN_OPACITY)
     if model.sums_light:
         at, correction = model.quadrature_correction(
             light, view_dirs, points, spread.heaviest, None if capacity is None else spread.sizes[1]
         )
         mean = add_corrections(mean, correction, at, spread, samples.ray_indices, shares, opacity.detach())
     return RenderedRays(
+        found,
         mean,
         c.shading.compositing == "linear",
         opacity,
         s,
-        samples,
-        found.evaluated,
-        found.n_found,
         weights,
-        values,
         field.gradient,
         field.outputs[n : len(found.positions) - len(found.beside), 0],
-        found.beside,
         shaded,
         spread.sizes,
         shares,
@@ -324,7 +310,6 @@ def render_view(
     """Renders a whole view with its maps.
 
     Args:
-        model: The scene.
         cells: [r, r, r] uint8 cells of the occupancy grid.
         pose: [4, 4] camera-to-world, OpenGL axes, internal frame.
         intrinsics: [4] fx, fy, cx, cy in pixels.
@@ -347,7 +332,7 @@ def render_view(
             1,
         )
         weighed = ray.shares[:, None] * torch.cat([maps, torch.ones_like(maps[:, :1])], 1)
-        sums = weighed.new_zeros(len(o), weighed.shape[1]).index_add(0, ray.samples.ray_indices[ray.shaded], weighed)
+        sums = weighed.new_zeros(len(o), weighed.shape[1]).index_add(0, found.packed.ray_indices[ray.shaded], weighed)
         mean = sums[:, :-1] / sums[:, -1:].clamp(min=MIN_OPACITY)
         rows.append(torch.cat([ray.colour.clamp(0, 1), ray.opacity[:, None], mean], 1))
     image = torch.cat(rows).view(height, width, -1)

@@ -63,7 +63,6 @@ def in_view(
     """The points of a surface that a photo shows: within its frame, from the front, with nothing of the mesh in between.
 
     Args:
-        scene: The mesh.
         points, normals: [n, 3] float32, the normals of unit length and outward.
         camera: Pose [4, 4], intrinsics [4] and size [2], as :class:`Cameras` has them.
         offset: How far in front of the surface a line of sight begins.

@@ -118,7 +118,7 @@ def loss_terms(
     )
     terms.add(
         {"eikonal": kept * w.eikonal_weight, "smoothness": (shapes and w.smoothness_weight) or None},
-        gradient_losses(ray.gradients, ray.weights.detach(), ray.beside),
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside),
     )
     terms.add(
         {"metal": w.metal_weight or None, "dark_metal": w.dark_metal_weight or None},

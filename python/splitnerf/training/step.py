@@ -199,7 +199,7 @@ class Step:
         numbers = torch.stack(
             [*(term.value for term in terms.values()), torch.nn.utils.get_total_norm(gradients, foreach=True)]
         )
-        counts = torch.cat([ray.n_found[None], ray.sizes, ray.evaluated.sum()[None]])
+        counts = torch.cat([ray.found.n_found[None], ray.sizes, ray.found.evaluated.sum()[None]])
         numbers = torch.cat([numbers, counts, ray.s[None]]).detach()
         allowed = (numbers.abs() < _limits(len(terms), self.capacity, numbers.device)).all()  # false for NaN
         weights = {name: term.weight for name, term in terms.items()}
