@@ -113,7 +113,11 @@ def reconstruct(
         config = for_turntable(config) if dataset.light_turns is not None else config
         config = config if resume else without_fine_levels(dataset, config)
         training = begun(dataset, config, run, torch.device(device), observer, resume)
-        begin_run(run, config, dataset, overwrite)
+        if overwrite:
+            clear_run(run)
+        write_place(run, dataset.origin)
+        write_data_of(run, dataset)
+        config.write(run / "config.toml")
         training.complete()
         if not training.finished:
             return training, None
@@ -136,15 +140,6 @@ def for_turntable(config: Config) -> Config:
     if config.occlusion.kind == "mlp":
         raise InputError("photos of a turntable need occlusion.kind = bits or off; change --set or --preset")
     return config.replace({"shading.method": "split", "run.cuda_graphs": False})
-
-
-def begin_run(run: Path, config: Config, dataset: Dataset, overwrite: bool) -> None:
-    """Writes what a run's folder holds from the start; with ``overwrite`` deletes what a run before left there."""
-    if overwrite:
-        clear_run(run)
-    write_place(run, dataset.origin)
-    write_data_of(run, dataset)
-    config.write(run / "config.toml")
 
 
 def load_with_masks(

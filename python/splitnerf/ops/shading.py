@@ -24,11 +24,6 @@ SHADED = "normals view_dirs albedo roughness metallic specular diffuse occlusion
 
 
 @functools.lru_cache(maxsize=8)
-def _brdf_lut(device: torch.device) -> Tensor:
-    with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
-        return torch.from_numpy(_core.brdf_lut()).to(device)
-
-
 def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
     """The table of the split sum: [32 roughness, 32 sqrt(n.v), (F1, F2, chi, E_d)] float32, computed once.
 
@@ -36,7 +31,8 @@ def brdf_lut(device: torch.device | str = "cpu") -> Tensor:
     GGX, ggx_alpha = roughness squared), that of a dielectric of index 1.5 with the exact term is E_d; chi places the
     lobe's mean direction between normal and reflection.
     """
-    return _brdf_lut(torch.device(device))
+    with torch.inference_mode(False):  # a first call in inference mode must not make an inference tensor
+        return torch.from_numpy(_core.brdf_lut()).to(device)
 
 
 @front(n_rows=2, normals=1, view_dirs=1, roughness=1)
