@@ -251,6 +251,7 @@ def test_the_brightest_lobe_is_the_one_of_most_power():
 
 
 ASKEW = unit(SUN + np.array([0.05, 0.03, 0.0]))  # by 3 degrees
+POLISH = np.broadcast_to(np.float32([0.2, 0.0]), (SIZE, SIZE, 2))  # roughness and metallic of what mirrors
 
 
 @pytest.mark.parametrize("kept", [0.7, 0.55])
@@ -277,13 +278,15 @@ def test_the_width_of_a_soft_sun_is_found(ball_over_plate):
 
 def test_a_lobe_that_mirrors_have_shown_has_its_lamp_in_its_middle(ball_over_plate):
     """Shadows tell its width alone: its middle is known better than they tell it, and it need not have lost power."""
-    light = glowing_sky(6.0)
-    new, lamp = found(ball_over_plate, shaded_albedo(ball_over_plate, 0.3, glowing_sky(6.0, ASKEW)), light)
+    light, glossy = glowing_sky(6.0), with_textures(ball_over_plate, roughness_metallic_texture=POLISH)
+    askew = shaded_albedo(ball_over_plate, 0.3, glowing_sky(6.0, ASKEW))
+    assert found(ball_over_plate, askew, light)[1] is None  # of what mirrors nothing, the lobe has lost no power
+    new, lamp = found(glossy, askew, light)
     assert degrees_from(np.array(lamp.direction), SUN) < 0.3
     assert lamp.radius < 4.0 and new.max() > 2 * light.max()
     dim = (0.6 * (light - 0.3) + 0.3).astype(np.float32)
     blurred = shaded_albedo(ball_over_plate, 0.3, dim) ** 0.7  # as by training: the best lamp has 1.2
-    new, lamp = found(ball_over_plate, blurred, dim)
+    new, lamp = found(glossy, blurred, dim)
     assert 1.3 < lamp.factor < 1.6 / 0.6
     away = degrees_from(directions_of_texels(64)[0], SUN) > 60
     np.testing.assert_allclose(new[away].mean(1), 0.3, rtol=1e-3)  # the rest stays
@@ -295,13 +298,13 @@ def test_light_beside_a_warm_lamp_becomes_as_blue_as_all_light_was_grey():
     lobe = brightest_lobe(warm)
     grey = (lobe.radiance + 0.3 * np.float32([0.9, 1.0, 1.1])).astype(np.float32)
     colour = lambda light: (light * areas[..., None]).sum((0, 1)) / power_of(light)
-    for sharp in (True, False):
-        new = with_lamp(grey, lobe._replace(sharp=sharp), CompactLamp(SUN.tolist(), 3.0, 1.8, 0), False)
+    for mirrored in (True, False):
+        new = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 1.8, 0), mirrored=mirrored)
         np.testing.assert_allclose(colour(new), colour(grey), rtol=1e-3)
-        gain = 1.0 if not sharp else 1 + 0.8 * lobe.power.mean() / power_of(grey)
+        gain = 1.0 if not mirrored else 1 + 0.8 * lobe.power.mean() / power_of(grey)
         assert power_of(new) == pytest.approx(gain * power_of(grey), rel=1e-3)
         assert new[0, 0, 2] / new[0, 0, 0] > 1.1 * grey[0, 0, 2] / grey[0, 0, 0]
-    strong = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 40.0, 0), False)
+    strong = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 40.0, 0), mirrored=True)
     assert (strong > 0).all()  # however strong the lamp
 
 
@@ -337,8 +340,10 @@ def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate,
 
 def test_shadows_on_metal_and_in_a_light_without_a_lamp_say_nothing(ball_over_plate):
     light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
-    albedo, ones = shaded_albedo(ball_over_plate, 0.3, light), np.ones((SIZE, SIZE, 2), np.float32)
-    metal = with_textures(ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=ones)
+    albedo = shaded_albedo(ball_over_plate, 0.3, light)
+    metal = with_textures(
+        ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=POLISH + np.float32([0, 1])
+    )
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
     mirrored = compact_lamp(AssetTexels(metal), glowing_sky(6.0), 3, 0)[
         1

@@ -5,9 +5,9 @@ takes the edges of the sun's shadow. Light and albedo together then explain the 
 them. But the true albedo does not depend on shadows: of two close points, one in the shadow of a part of the lobe and
 one outside it, it is the same on average over many pairs. If the lobe stands for a compact lamp, the albedo outside the
 shadow is instead brighter by what the lamp adds there. So the lamp's direction, width and power are those that leave
-the smallest contrasts between such points. Where mirror images have shown the lamp, its direction is that of the lobe. The light of the
-lobe is then made compact. The power of all light stays; but where photos show what else shines on the object, that stays, and the albedo
-takes the change.
+the smallest contrasts between such points. Where glossy texels have mirrored the light, its direction is that of the
+lobe, and the rest of the light stays; else the power of all light does, unless photos show what else shines on the
+object. What scatters gets darker by what the lamp adds.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from splitnerf.data.environment import directions_of_texels
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
 from splitnerf.ops.visibility import visibility_bits
+from splitnerf.refinement.level import GLOSSY, LEAST_SHARE
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
 REACH = 30.0  # degrees from a lobe's middle to its end
@@ -41,8 +42,8 @@ MIN_ALBEDO = 0.05  # of the brighter one of a pair; darker dielectrics mirror mo
 LARGEST_CONTRAST = 1.5  # of log albedo; beyond it, it is the texture's
 NEAR = 0.15  # contrast from which on the cost grows slowly
 FARTHEST = 12.0  # degrees from the lobe's direction to the farthest lamp that is tried
-# A lobe with half its power within SHARP degrees was seen in mirror images, smeared by training: a lamp is in its middle, and shadows tell
-# its width and power alone. On 30 trained runs the middles of such lobes were 0.1 to 1.6 degrees off, in one 2.9, those of broader ones up to 9.
+# A lobe with half its power within SHARP degrees in the light of a glossy object was seen in mirror images, smeared by training: a lamp is in its
+# middle. On 30 trained runs the middles of such lobes were 0.1 to 1.6 degrees off, in one 2.9, those of broader ones up to 9.
 SHARP = 12.0
 # Usual power of a sun divided by that of its lobe (geometric mean of 15 trained runs; 1.5 to 3.6), and how many logarithms away from it
 # count as one standard error of the pairs, whose texture training has blurred: alone they are 0.7 of the truth, in one run 0.3.
@@ -285,26 +286,23 @@ def compact_lamp(
     lobe = brightest_lobe(light)
     if not lobe.radiance.any():
         return light, None
+    mirrored, lamp = bool((texels.start[:, 3] < GLOSSY).float().mean() >= LEAST_SHARE), None
+    if mirrored and lobe.sharp:
+        lamp = CompactLamp(lobe.direction.tolist(), USUAL_RADIUS, USUAL_FACTOR, 0)
     points = at_edges(pairs_of(texels, APART * patch, seed), lobe, seed)
-    lamp = None
     if len(points.albedo) >= 2 * FEWEST:
         contrasts = Contrasts(points, light, lobe)
-        if rest_is_known or not lobe.sharp:  # that photos show the sky around a sun makes its lobe sharp, too
-            lamp = lamp_near(lobe, contrasts)
-        if lobe.sharp and (lamp or not rest_is_known):
-            lamp = usual_lamp(lamp.direction if lamp else lobe.direction.tolist(), contrasts)
-    elif lobe.sharp:
-        lamp = CompactLamp(lobe.direction.tolist(), USUAL_RADIUS, USUAL_FACTOR, 0)
-    return (light, None) if lamp is None else (with_lamp(light, lobe, lamp, rest_is_known), lamp)
+        lamp = lamp or lamp_near(lobe, contrasts)
+        if lamp is not None and lobe.sharp:
+            lamp = usual_lamp(lamp.direction, contrasts)
+    if lamp is None:
+        return light, None
+    return with_lamp(light, lobe, lamp, rest_is_known=rest_is_known, mirrored=mirrored), lamp
 
 
 def usual_lamp(direction: list[float], contrasts: Contrasts) -> CompactLamp:
     """The lamp in a direction that explains the pairs and is usual in its power."""
-    lamps = [
-        CompactLamp(direction, radius, factor, len(contrasts.costs))
-        for radius in RADII[:-1]
-        for factor in FACTORS.tolist()
-    ]
+    lamps = [CompactLamp(direction, r, f, len(contrasts.costs)) for r in RADII[:-1] for f in FACTORS.tolist()]
     left = np.stack([contrasts.left_by(lamp) for lamp in lamps])
     more = left - left[left.mean(axis=1).argmin()]
     errors = more.mean(axis=1) / np.maximum(more.std(axis=1) / np.sqrt(left.shape[1]), 1e-9)
@@ -323,11 +321,13 @@ def lamp_near(lobe: Lobe, contrasts: Contrasts) -> CompactLamp | None:
     return best if clear and not at_rim and best.factor >= LEAST_FACTOR else None
 
 
-def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp, rest_is_known: bool) -> np.ndarray:
+def with_lamp(
+    light: np.ndarray, lobe: Lobe, lamp: CompactLamp, *, rest_is_known: bool = False, mirrored: bool = False
+) -> np.ndarray:
     """A map [h, 2 h, 3] with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a lobe.
 
     Unless the rest is known, all light keeps its colour, as far as MOST_TINT allows: training finds that of a lamp, and takes the rest for greyer
-    than it is. The rest keeps its power where mirror images have shown the lobe, else all light does.
+    than it is. The rest keeps its power where it is known or was mirrored, else all light does.
     """
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
@@ -340,7 +340,7 @@ def with_lamp(light: np.ndarray, lobe: Lobe, lamp: CompactLamp, rest_is_known: b
         gain = (behind + added).mean() / before.mean()
         changed *= np.clip((gain * before - added) / np.maximum(behind, 1e-20), 1 / MOST_TINT, MOST_TINT)
     changed[inside] += added / areas[inside].sum()
-    scale = 1.0 if rest_is_known or lobe.sharp else power_of(light) / power_of(changed)
+    scale = 1.0 if rest_is_known or mirrored else power_of(light) / power_of(changed)
     return (changed * scale).astype(np.float32)
 
 
