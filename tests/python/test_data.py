@@ -147,6 +147,8 @@ def test_truth_maps(scene):
     assert empty.albedo is empty.roughness is empty.metallic is empty.normal is empty.normal_mask is None
     scene_truth = load_scene_truth(scene)
     assert scene_truth.light.shape == (4, 8, 3) and len(scene_truth.mesh.faces) == 12
+    write_image(scene / "light.exr", np.ones((8, 16, 3)))
+    assert load_scene_truth(scene).light.shape == (8, 16, 3)
     moved = load_scene_truth(scene, np.array([100.0, -20, 3])).mesh
     assert moved.vertices == pytest.approx(scene_truth.mesh.vertices - [100, -20, 3])
     assert load_scene_truth(scene / "test").light is None and load_scene_truth(scene / "test").mesh is None

@@ -6,7 +6,7 @@ Files, `r_N` standing for the image's own name, each optional:
     r_N_orm.png      linear; G roughness, B metallic
     r_N_normal.exr   world-space normals, multiplied by coverage; alpha is the coverage
     r_N_normal.png   world-space normals, negative components clipped to 0, sRGB-encoded (the NeRF Blender scenes)
-    light.hdr, mesh.ply   in the dataset's folder
+    light.exr (or .hdr), mesh.ply   in the dataset's folder
 Beside an image that has `r_N_alpha.png` too (Shiny Blender), `r_N_normal.png` is n / 2 + 1 / 2, linear.
 In view folders (:mod:`splitnerf.data.layouts.view_folders`) `albedo.png`, linear, and `normal.png` lie beside `rgba.png`.
 
@@ -68,12 +68,11 @@ class SceneTruth:
 
 
 def load_scene_truth(root: str | os.PathLike, origin: np.ndarray | None = None) -> SceneTruth:
-    """Loads `light.hdr` and `mesh.ply` from a dataset's folder where they exist; the mesh is moved by -`origin`, see
-    `Dataset`. Raises InputError where one exists but cannot be used."""
-    light, mesh = Path(root) / "light.hdr", Path(root) / "mesh.ply"
-    truth = SceneTruth(
-        read_environment(light) if light.is_file() else None, read_mesh(mesh) if mesh.is_file() else None
-    )
+    """Loads `light.exr`, or else `light.hdr`, and `mesh.ply` from a dataset's folder where they exist; the mesh is moved by
+    -`origin`, see `Dataset`. Raises InputError where one exists but cannot be used."""
+    lights, mesh = [Path(root) / f"light{suffix}" for suffix in (".exr", ".hdr")], Path(root) / "mesh.ply"
+    light = next((read_environment(path) for path in lights if path.is_file()), None)
+    truth = SceneTruth(light, read_mesh(mesh) if mesh.is_file() else None)
     if truth.mesh is not None and origin is not None and origin.any():
         truth.mesh.apply_translation(-origin)
     return truth
