@@ -13,6 +13,7 @@ from bench.hash_grid import SPEC
 from op_cases import (
     CASES,
     EVERY,
+    ON_THE_CPU_ALONE,
     cached_occlusion_inputs,
     cached_visibility_inputs,
     check_against_the_cpu,
@@ -24,8 +25,9 @@ from op_cases import (
     sparse_inputs,
     truth,
 )
-from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, lib
+from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
 from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
+from splitnerf import _core
 from splitnerf.ops import linear_to_srgb
 from splitnerf.ops.training import quadratic_entropy
 from splitnerf_tools.doctor import cases
@@ -199,6 +201,13 @@ def test_the_results_are_those_of_the_cpu_in_float64(op, device, dtype):
 def test_every_operator_is_listed():
     every = {s.name.split("::")[1] for s in torch._C._jit_get_all_schemas() if s.name.startswith("splitnerf::")}
     assert every == set(EVERY) | WRITES_TO_ARGUMENTS
+
+
+@pytest.mark.skipif(not _core.cuda_architectures(), reason="built without CUDA")
+def test_the_build_holds_the_kernels():
+    """Also where no GPU is: the library loads there, and knows what it could run."""
+    assert {op for op in {*CASES, *WRITES_TO_ARGUMENTS} if not has_cuda_kernel(op)} == set()
+    assert {op for op in ON_THE_CPU_ALONE if has_cuda_kernel(op)} == set()
 
 
 # ---- what torch asks ----

@@ -77,6 +77,28 @@ def test_a_white_sky_gives_the_brdf_table(n_dot_v, roughness):
     assert sums.dielectric[0].tolist() == pytest.approx([layer] * 3, abs=1e-3)
 
 
+@pytest.mark.parametrize("compensate", [False, True])
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
+    """Where the light is L over the specular lobe, the sums are (F1 + F2) L, F2 L and E_d L."""
+    normals, view_dirs, albedo, roughness, metallic, sums = sums_inputs(200)
+    light, _, diffuse, _ = sums.unbind(1)
+    normals = turned * normals
+    one, black = torch.ones_like(albedo), torch.zeros_like(albedo)
+    metal = torch.ones_like(metallic)
+
+    def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
+        point = normals, view_dirs
+        return split_sum_shade(
+            *point, albedo=albedo, roughness=roughness, metallic=metallic, specular=one, diffuse=black
+        )
+
+    sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
+    material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": compensate}
+    there = split_sum_shade(normals, view_dirs, **material, specular=light, diffuse=diffuse)
+    torch.testing.assert_close(shade_sums(normals, view_dirs, **material, sums=sums), there)
+
+
 def test_a_sum_of_another_shape_is_named():
     x = sums_inputs()
     specular, grazing, diffuse, dielectric = x[5].unbind(1)

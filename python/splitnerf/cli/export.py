@@ -70,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
         if value is not None and not 1e-6 <= value <= 1e6:
             raise InputError(f"--{option} must lie between 1e-6 and 1e6, got {value:g}")
     out = args.out or export_folder(args.run)
+    if out.exists() and not out.is_dir():  # before the checkpoint is read
+        raise InputError(f"{out}: is a file; give --out a folder")
     exported = export_run(
         args.run,
         out,

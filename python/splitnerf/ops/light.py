@@ -66,6 +66,7 @@ def sample_ggx_lobe(axes: Tensor, roughness: Tensor, n_samples: int, seed: int =
         axes: [s, 3] unit axes of the lobes.
         roughness: [s, 1] perceptual roughness in [0, 1].
         n_samples: The number of directions per axis.
+        seed: The seed of the random shifts.
 
     Returns:
         [s, n_samples, 3] unit directions.

@@ -228,7 +228,7 @@ class Refinement:
         return brighter
 
     def make_lamp_compact(self) -> CompactLamp | None:
-        """Makes the brightest lobe of the light compact if the albedo shows the edge of its shadow; else None."""
+        """Makes the brightest lobe of the light compact if mirror images or its shadow's edge in the albedo show a lamp; else None."""
         if self.turns is not None:  # its shadow would stand elsewhere in each photo
             return None
         light, known = self.light.radiance().numpy(), self.seen is not None

@@ -26,9 +26,7 @@ from splitnerf.refinement.level import GLOSSY, LEAST_SHARE
 from splitnerf.refinement.texels import AssetTexels, materials_of, neighbours
 
 REACH = 30.0  # degrees from a lobe's middle to its end
-FADE = (
-    8.0  # width in degrees of the zone at its end in which it is not taken out of the light entirely: a cut would show
-)
+FADE = 8.0  # width in degrees of its rim, which leaves the light only in part: a cut would show
 RING = 15.0  # width in degrees of the ring around it whose median is the light behind it
 # widths of a patch between the points of a pair: with 2, training's blur makes suns of 1 degree into lamps of 8
 APART = 6
@@ -49,6 +47,7 @@ SHARP = 12.0
 # count as one standard error of the pairs, whose texture training has blurred: alone they are 0.7 of the truth, in one run 0.3.
 USUAL_FACTOR, PER_ERROR = 2.0, 0.06
 USUAL_RADIUS = 8.0  # degrees, of a lamp of which no shadow tells
+MOST_TINT = 1.25  # factor on a channel of the light beside a lamp
 N_TRIED, N_FINER, FINER = 448, 64, 1.0  # directions that are tried; then those within some degrees of the best
 RADII = (1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 12.0)  # degrees
 LEAST_RADIUS = 3.0  # degrees, of the lamp in the light: fits of lamps narrower than two of its texels are noisy
@@ -57,10 +56,9 @@ COARSE = 4
 # directions of the disc of FARTHEST degrees, and of all that lamps may fill; multiples of 32
 N_CENTRAL, N_TABLE = 32, 1792
 N_BEHIND, N_LOBE = 512, 256  # directions that stand for the other light and for the lobe; multiples of 32
-# Of a lamp in the place of a lobe that is not sharp:
+# Of a lamp of which shadows alone tell:
 MIN_SIGMAS = 5.0  # by which it must explain the pairs better
 LEAST_FACTOR = 1.15  # of its power: training takes power from a lamp that it smears, since the albedo has its shadow
-MOST_TINT = 1.25  # factor on a channel of the light beside a lamp
 DARK = 0.02  # share of the mean light that counts as none
 
 
@@ -81,13 +79,13 @@ class Lobe(NamedTuple):
 
 
 class CompactLamp(NamedTuple):
-    """The lamp that the pairs indicate.
+    """The lamp in the place of a lobe.
 
     Attributes:
         direction: [3] unit, a list.
         radius: Degrees; in the light it is at least LEAST_RADIUS.
         factor: The lamp's power divided by the lobe's; the rest of the light stays.
-        pairs: The number of pairs used.
+        pairs: The number of pairs used; 0 where there were too few.
     """
 
     direction: list[float]
@@ -271,7 +269,7 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
 def compact_lamp(
     texels: AssetTexels, light: np.ndarray, patch: int, seed: int, *, rest_is_known: bool = False
 ) -> tuple[np.ndarray, CompactLamp | None]:
-    """The light with its brightest lobe made compact, if the albedo indicates a compact lamp.
+    """The light with its brightest lobe made compact, if mirror images or the albedo indicate a lamp.
 
     Args:
         texels: The asset that was trained with the light.
@@ -303,7 +301,8 @@ def compact_lamp(
 def usual_lamp(direction: list[float], contrasts: Contrasts) -> CompactLamp:
     """The lamp in a direction that explains the pairs and is usual in its power."""
     lamps = [CompactLamp(direction, r, f, len(contrasts.costs)) for r in RADII[:-1] for f in FACTORS.tolist()]
-    left = np.stack([contrasts.left_by(lamp) for lamp in lamps])
+    arriving = {radius: contrasts.lamps(np.array([direction]), radius) for radius in RADII[:-1]}
+    left = np.stack([contrasts.costs_left(arriving[lamp.radius], lamp.factor)[:, 0] for lamp in lamps])
     more = left - left[left.mean(axis=1).argmin()]
     errors = more.mean(axis=1) / np.maximum(more.std(axis=1) / np.sqrt(left.shape[1]), 1e-9)
     unusual = np.log([lamp.factor / USUAL_FACTOR for lamp in lamps])

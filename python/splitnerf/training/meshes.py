@@ -138,8 +138,11 @@ def make_mesh(model: SceneModel, network: SdfNetwork, aims: Tensor | None) -> Tr
     """The zero level set of a field, traced in directions `aims` [k, 3]; None where it is empty. Only constants of the
     model are read. Raises RuntimeError where the field is not finite."""
     try:
-        sdf = lambda points: sdf_values(points.to(network.table.device), network).cpu()  # noqa: E731
-        vertices, faces = extract_mesh(sdf, model.config.constants.box, model.config.mesh.resolution)
+        vertices, faces = extract_mesh(
+            lambda points: sdf_values(points.to(network.table.device), network).cpu(),
+            model.config.constants.box,
+            model.config.mesh.resolution,
+        )
     except EmptyMesh:
         return None
     return traced(model, torch.from_numpy(vertices), torch.from_numpy(faces), aims)
