@@ -1,5 +1,6 @@
 """The shape that a training starts from: depths by stereo, what they carve, and the surface that is held near it."""
 
+import contextlib
 import math
 from types import SimpleNamespace
 
@@ -306,4 +307,35 @@ def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monk
     config = tiny(**{"surface.start": "stereo", "steps": 400, "sphere_radius": of_sphere})
     training = begun(load_dataset(data), config, tmp_path, torch.device("cpu"))
     assert (training.take_step.start is shape) == (radius == 0.7)
-    assert training.step == 50 and training.run == tmp_path and not list(tmp_path.iterdir())
+    assert training.step == 60 and training.run == tmp_path and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("leads", "is_kept", "steps"),
+    [
+        ([2.0, 0.5, 0.3, -0.5, -1.0], False, 1000),  # a wrong shape, which leads at first
+        ([0.0, 0.8, 0.8, 0.6, 0.4], True, 1000),
+        ([0.5, 0.5, 0.5, 0.3, -0.2], False, 1000),
+        ([0.3, 1.8, 1.5, 1.5, 1.5], True, 600),
+        ([0.5, -0.7, -1.5, -1.5, -1.5], False, 600),
+    ],
+)
+def test_a_trial_ends_where_a_lead_is_sure_and_sees_beyond_a_wrong_shapes_first_steps(leads, is_kept, steps, tmp_path):
+    def trained(psnrs):
+        each = SimpleNamespace(config=tiny(steps=20_000), run=tmp_path, observer=None, started=0.0, step=0)
+        each.log, each.take_step = (
+            SimpleNamespace(path=None, psnr=None),
+            SimpleNamespace(running=contextlib.nullcontext),
+        )
+        each.refresh = each.settle = lambda: None
+
+        def advance(_):
+            each.log.psnr = psnrs[each.step // 200]
+            each.step += 1
+
+        each.advance = advance
+        return each
+
+    sphere, other = trained([20.0] * 5), trained([20.0 + x for x in leads])
+    assert (loop.better_of(sphere, other) is other) == is_kept
+    assert other.step == sphere.step == steps

@@ -39,9 +39,9 @@ from splitnerf.training.schedule import (
 from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
-# Steps of a first shape that is not sure, and of a sphere beside it; the share of the run's time or steps that both may take; and the
-# decibels by which the shape must be better: one that is wrong leads for some hundred steps.
-TRIED_STEPS, TRIED_SHARE, CLEARLY = 600, 0.25, 0.2
+# Steps of a first shape that is not sure, and of a sphere beside it: the fewest, from which a lead of SURELY decibels decides, and
+# the most; wrong shapes lead at first. The steps over which a lead is the mean; the share of the run's time or steps that both may take.
+FEWEST_TRIED, MOST_TRIED, SURELY, LED, TRIED_SHARE = 600, 1000, 1.0, 150, 0.3
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -274,23 +274,24 @@ def begun(
 
 
 def better_of(sphere: Training, other: Training) -> Training:
-    """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos clearly
-    better after some hundred steps; also where there is no time for most of these."""
+    """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos better
+    after a thousand steps, or surely better where there is no time for these."""
     c, run, observer, found = sphere.config, sphere.run, sphere.observer, []
-    n_steps = min(TRIED_STEPS, int(0.5 * TRIED_SHARE * c.run.steps))
+    n_steps = min(MOST_TRIED, int(0.5 * TRIED_SHARE * c.run.steps))
     ends = time.monotonic() + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
-    other.started = sphere.started
+    other.started, lead, is_told = sphere.started, 0.0, False
     with tempfile.TemporaryDirectory() as folder:
         for each in (sphere, other):  # the run's folder may still hold an earlier run
             each.observer, each.log.path = NOBODY, Path(folder) / METRICS
-        while len(found) < n_steps and time.monotonic() < ends:
+        while not is_told and time.monotonic() < ends:
             for each in (sphere, other):
                 with each.take_step.running():
                     each.refresh()
                     each.advance(None)
-            found.append([each.log.psnr or 0.0 for each in (sphere, other)])
-        of_sphere, of_other = np.mean(found[-max(1, n_steps // 4) :] or [[0.0, 0.0]], axis=0)
-        better = other if len(found) > 0.75 * n_steps and of_other > of_sphere + CLEARLY else sphere
+            found.append((other.log.psnr or 0.0) - (sphere.log.psnr or 0.0))
+            lead = float(np.mean(found[-LED:]))
+            is_told = len(found) >= n_steps or len(found) >= FEWEST_TRIED and abs(lead) > SURELY
+        better = other if is_told and lead > 0 else sphere
         better.settle()
     better.observer, better.log.path = observer, run / METRICS
     return better
