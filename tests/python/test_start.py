@@ -310,32 +310,35 @@ def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monk
     assert training.step == 60 and training.run == tmp_path and not list(tmp_path.iterdir())
 
 
+class Scripted:
+    """A training whose photos have these decibels, each for 200 steps."""
+
+    def __init__(self, psnrs, config, run):
+        self.psnrs, self.config, self.run, self.observer, self.step = psnrs, config, run, None, 0
+        self.log, self.take_step = SimpleNamespace(), SimpleNamespace(running=contextlib.nullcontext)
+        self.started, self.refresh, self.settle = 0.0, lambda: None, lambda: None
+
+    def advance(self, _):
+        self.log.psnr = self.psnrs[self.step // 200]
+        self.step += 1
+
+
 @pytest.mark.parametrize(
-    ("leads", "is_kept", "steps"),
+    ("leads", "time_for", "is_kept", "steps"),
     [
-        ([2.0, 0.5, 0.3, -0.5, -1.0], False, 1000),  # a wrong shape, which leads at first
-        ([0.0, 0.8, 0.8, 0.6, 0.4], True, 1000),
-        ([0.5, 0.5, 0.5, 0.3, -0.2], False, 1000),
-        ([0.3, 1.8, 1.5, 1.5, 1.5], True, 600),
-        ([0.5, -0.7, -1.5, -1.5, -1.5], False, 600),
+        ([2.0, 0.5, 0.3, -0.5, -0.9], 2000, False, 1000),  # a wrong shape leads at first
+        ([0.0, 0.8, 0.8, 0.6, 0.4], 2000, True, 1000),
+        ([0.3, 1.8, 1.5, 1.5, 1.5], 2000, True, 600),
+        ([0.5, -0.7, -1.5, -1.5, -1.5], 2000, False, 600),
+        ([0.0, 0.8, 0.8, 0.4, 0.4], 800, True, 800),
+        ([0.0, 0.8, 0.8, 0.1, 0.1], 800, False, 800),
+        ([2.0, 2.0, 2.0, 2.0, 2.0], 400, False, 400),
     ],
 )
-def test_a_trial_ends_where_a_lead_is_sure_and_sees_beyond_a_wrong_shapes_first_steps(leads, is_kept, steps, tmp_path):
-    def trained(psnrs):
-        each = SimpleNamespace(config=tiny(steps=20_000), run=tmp_path, observer=None, started=0.0, step=0)
-        each.log, each.take_step = (
-            SimpleNamespace(path=None, psnr=None),
-            SimpleNamespace(running=contextlib.nullcontext),
-        )
-        each.refresh = each.settle = lambda: None
-
-        def advance(_):
-            each.log.psnr = psnrs[each.step // 200]
-            each.step += 1
-
-        each.advance = advance
-        return each
-
-    sphere, other = trained([20.0] * 5), trained([20.0 + x for x in leads])
+def test_a_trial_ends_with_a_sure_lead_or_sees_more(leads, time_for, is_kept, steps, tmp_path, monkeypatch):
+    minutes = time_for / (60 * loop.TRIED_SHARE)
+    config = tiny(steps=20_000, **{"run.max_minutes": minutes, "refinement.enabled": False})
+    sphere, other = (Scripted([20.0 + x for x in each], config, tmp_path) for each in ([0.0] * 5, leads))
+    monkeypatch.setattr(loop, "time", SimpleNamespace(monotonic=lambda: float(other.step)))
     assert (loop.better_of(sphere, other) is other) == is_kept
     assert other.step == sphere.step == steps

@@ -224,9 +224,10 @@ def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch
     assert asking.heard[-3:] == [("export", None), ("refinement", True), ("evaluation", True)]
     assert "without refinement, as nothing to fit" in (err := capsys.readouterr().err)
     assert (run / "mesh.glb").is_file() and json.loads((run / "evaluation.json").read_text())["scored"] == "fields"
-    said = [line.partition(",")[0] for line in err.splitlines() if line.startswith("stage")]
-    where = f"on {torch.get_num_threads()} threads of the CPU; in all 30 steps; results go to {run}"
-    names = [f"training {where}", "export", "refinement", "evaluation"]
+    where = rf"{torch.get_num_threads()} threads? of the CPU, [\d.]+ of [\d.]+ GB of memory free"
+    assert re.search(f"training on {where}; in all 30 steps; results go to {run}$", err, re.MULTILINE)
+    said = [re.split(", | on ", line)[0] for line in err.splitlines() if line.startswith("stage")]
+    names = ["training", "export", "refinement", "evaluation"]
     assert said == [f"stage {number} of 4: {name}" for number, name in enumerate(names, 1)]
 
 

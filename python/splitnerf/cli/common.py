@@ -14,6 +14,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, NoReturn
 
 from splitnerf.errors import plain
+from splitnerf.memory import memory_bytes
 
 if TYPE_CHECKING:
     from splitnerf.data.reading import Reading
@@ -161,12 +162,12 @@ class Stages:
         if event.kind == "begun":
             import torch
 
-            training, run = event.training, event.training.config.run
+            training, run, n = event.training, event.training.config.run, torch.get_num_threads()
             refinement = ["refinement"] if training.config.refinement.enabled else []
             self._names = ["training", "export", *refinement, "evaluation"]
-            where = (
-                "the GPU" if training.model.device.type != "cpu" else f"{torch.get_num_threads()} threads of the CPU"
-            )
+            cpu = f"{n} thread{'s' * (n > 1)} of the CPU"
+            total, free = (f"{size / 1e9:.3g}" for size in memory_bytes())
+            where = f"{cpu if training.model.device.type == 'cpu' else 'the GPU'}, {free} of {total} GB of memory free"
             ends = (
                 f"{run.max_minutes:.3g} minutes, export and scores aside" if run.max_minutes else f"{run.steps} steps"
             )

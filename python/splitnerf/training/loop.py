@@ -39,8 +39,8 @@ from splitnerf.training.schedule import (
 from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
-# Steps of a first shape that is not sure, and of a sphere beside it: the fewest, from which a lead of SURELY decibels decides, and
-# the most; wrong shapes lead at first. The steps over which a lead is the mean; the share of the run's time or steps that both may take.
+# Steps of a first shape that is not sure, and of a sphere beside it: the fewest that tell, and the most; wrong shapes lead at first.
+# Decibels that decide before the most are made. The steps over which a lead is the mean; the share of the run's time or steps for both.
 FEWEST_TRIED, MOST_TRIED, SURELY, LED, TRIED_SHARE = 600, 1000, 1.0, 150, 0.3
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
@@ -275,23 +275,23 @@ def begun(
 
 def better_of(sphere: Training, other: Training) -> Training:
     """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos better
-    after a thousand steps, or surely better where there is no time for these."""
+    after a thousand steps, or as much better as steps are missing where there is no time for these."""
     c, run, observer, found = sphere.config, sphere.run, sphere.observer, []
-    n_steps = min(MOST_TRIED, int(0.5 * TRIED_SHARE * c.run.steps))
+    n_steps = max(1, min(MOST_TRIED, int(0.5 * TRIED_SHARE * c.run.steps)))
     ends = time.monotonic() + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
-    other.started, lead, is_told = sphere.started, 0.0, False
+    other.started, lead, n = sphere.started, 0.0, 0
     with tempfile.TemporaryDirectory() as folder:
         for each in (sphere, other):  # the run's folder may still hold an earlier run
             each.observer, each.log.path = NOBODY, Path(folder) / METRICS
-        while not is_told and time.monotonic() < ends:
+        while n < n_steps and time.monotonic() < ends and (n < FEWEST_TRIED or abs(lead) < SURELY):
             for each in (sphere, other):
                 with each.take_step.running():
                     each.refresh()
                     each.advance(None)
             found.append((other.log.psnr or 0.0) - (sphere.log.psnr or 0.0))
-            lead = float(np.mean(found[-LED:]))
-            is_told = len(found) >= n_steps or len(found) >= FEWEST_TRIED and abs(lead) > SURELY
-        better = other if is_told and lead > 0 else sphere
+            lead, n = float(np.mean(found[-LED:])), len(found)
+        is_better = n >= min(FEWEST_TRIED, n_steps) and lead > SURELY * (1.0 - n / n_steps)
+        better = other if is_better else sphere
         better.settle()
     better.observer, better.log.path = observer, run / METRICS
     return better
