@@ -48,7 +48,11 @@ def report(ball, tmp_path_factory):
     true = np.full((128, 256, 3), 0.5, np.float32)
     true[LAMP] = (64.0, 8.0, 1.0)
     above = np.repeat(np.linspace(3, 0, 64, dtype=np.float32), 128 * 3).reshape(64, 128, 3)
-    for file, picture in {**dict.fromkeys(FILES, above), "square.exr": above[:, :64]}.items():
+    for file, picture in {
+        **dict.fromkeys(FILES, above),
+        "square.exr": above[:, :64],
+        "negative.exr": above - 1,
+    }.items():
         write_image(folder / file, picture)
     (folder / "cut.exr").write_bytes((folder / "above.exr").read_bytes()[:900])
     (folder / "notes.txt").write_text("no light")
@@ -145,6 +149,7 @@ def seen(report):
         *maps,
         choose("shaded"),
         *(step for name in ("true light", "sunset") for step in (light(name), part(name, object_))),
+        *dropped("negative.exr"),
         *(step for file in FILES for step in (*dropped(file), part(file, object_))),
         *(step for file in ("square.exr", "cut.exr", "notes.txt") for step in dropped(file)),
         say("chosen", f"{LIGHT}.selectedOptions[0].text"),
@@ -239,6 +244,7 @@ def test_lights_of_the_readers_own_files_light_the_object(seen):
     assert told["texts"]["chosen"] == "above.hdr" and np.abs(pictures["above.exr"] - pictures["above.hdr"]).max() < 0.02
     assert np.array_equal(pictures["kept"], pictures["above.hdr"])
     assert told["texts"]["said of square.exr"].endswith("is 64x64; an equirectangular map is twice as wide as high")
+    assert told["texts"]["said of negative.exr"] == "Its negative radiance is shown as 0."
     assert told["texts"]["said of cut.exr"].startswith("cut.exr: ")
     assert told["texts"]["said of notes.txt"] == "notes.txt: is no .hdr or .exr file"
 

@@ -326,13 +326,13 @@ class Scripted:
 @pytest.mark.parametrize(
     ("leads", "time_for", "is_kept", "steps"),
     [
-        ([2.0, 0.5, 0.3, -0.5, -0.9], 2000, False, 1000),  # a wrong shape leads at first
-        ([0.0, 0.8, 0.8, 0.6, 0.4], 2000, True, 1000),
-        ([0.3, 1.8, 1.5, 1.5, 1.5], 2000, True, 600),
-        ([0.5, -0.7, -1.5, -1.5, -1.5], 2000, False, 600),
+        ([2.0, 0.5, 0.3, -0.2, -0.4], 2000, False, 1000),  # a wrong shape leads at first
+        ([-0.6, 0.8, 0.8, 0.6, 0.4], 2000, True, 1000),
+        ([0.3, 1.8, 1.5, 1.5, 1.5], 2000, True, 400),
+        ([0.5, -0.7, -1.5, -1.5, -1.5], 2000, False, 400),
         ([0.0, 0.8, 0.8, 0.4, 0.4], 800, True, 800),
         ([0.0, 0.8, 0.8, 0.1, 0.1], 800, False, 800),
-        ([2.0, 2.0, 2.0, 2.0, 2.0], 400, False, 400),
+        ([2.0, 2.0, 2.0, 2.0, 2.0], 300, False, 300),
     ],
 )
 def test_a_trial_ends_with_a_sure_lead_or_sees_more(leads, time_for, is_kept, steps, tmp_path, monkeypatch):

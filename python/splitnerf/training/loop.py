@@ -40,8 +40,9 @@ from splitnerf.training.start import StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
 # Steps of a first shape that is not sure, and of a sphere beside it: the fewest that tell, and the most; wrong shapes lead at first.
-# Decibels that decide before the most are made. The steps over which a lead is the mean; the share of the run's time or steps for both.
-FEWEST_TRIED, MOST_TRIED, SURELY, LED, TRIED_SHARE = 600, 1000, 1.0, 150, 0.3
+# The decibels by which a shape may be behind, and those that it must lead by, to be told before the most are made; the steps over
+# which a lead is the mean; the share of the run's time or steps that both may take.
+FEWEST_TRIED, MOST_TRIED, BEHIND, AHEAD, LED, TRIED_SHARE = 400, 1000, 0.5, 1.0, 100, 0.3
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -283,14 +284,14 @@ def better_of(sphere: Training, other: Training) -> Training:
     with tempfile.TemporaryDirectory() as folder:
         for each in (sphere, other):  # the run's folder may still hold an earlier run
             each.observer, each.log.path = NOBODY, Path(folder) / METRICS
-        while n < n_steps and time.monotonic() < ends and (n < FEWEST_TRIED or abs(lead) < SURELY):
+        while n < n_steps and time.monotonic() < ends and (n < FEWEST_TRIED or -BEHIND < lead < AHEAD):
             for each in (sphere, other):
                 with each.take_step.running():
                     each.refresh()
                     each.advance(None)
             found.append((other.log.psnr or 0.0) - (sphere.log.psnr or 0.0))
             lead, n = float(np.mean(found[-LED:])), len(found)
-        is_better = n >= min(FEWEST_TRIED, n_steps) and lead > SURELY * (1.0 - n / n_steps)
+        is_better = n >= min(FEWEST_TRIED, n_steps) and lead > AHEAD * (1.0 - n / n_steps)
         better = other if is_better else sphere
         better.settle()
     better.observer, better.log.path = observer, run / METRICS

@@ -42,10 +42,11 @@ export async function object(section, { camera, lights, studio, name }) {
   const said = element("p", { class: "hint" });
   const opened = async (file) => {
     try {
-      all.push(await lightOf(file));
+      const one = await lightOf(file);
+      all.push(one);
       controls.setLights(names(), all.length - 1);
       controls.tell();
-      said.textContent = "";
+      said.textContent = one.note;
     } catch (error) {
       said.textContent = error.message;
     }

@@ -124,11 +124,16 @@ function samplesOf({ data, width, height }) {
     ends[row] = all += running[row * width + width - 1];
   }
   if (!(ends[rows - 1] > 0)) return [];
-  const found = (list, share) => Math.min(list.findIndex((end) => end > share * list[list.length - 1]) >>> 0, list.length - 1);
+  const found = (list, share) => { // the texel and the place in it
+    const end = share * list[list.length - 1];
+    const i = Math.min(list.findIndex((each) => each > end) >>> 0, list.length - 1);
+    const before = i && list[i - 1];
+    return [i, i + Math.min((end - before) / (list[i] - before), 1)];
+  };
   return Array.from({ length: DIRECTIONS }, (_, i) => {
-    const row = found(ends, (0.5 + i * 0.7548776662) % 1); // a sequence that fills the square evenly from its start
-    const column = found(running.subarray(row * width, (row + 1) * width), (0.5 + i * 0.5698402910) % 1);
-    const [theta, phi] = [((row + 0.5) / height) * Math.PI, 2 * Math.PI * (0.5 - (column + 0.5) / width)];
+    const [row, v] = found(ends, (0.5 + i * 0.7548776662) % 1); // a sequence that fills the square evenly from its start
+    const [, u] = found(running.subarray(row * width, (row + 1) * width), (0.5 + i * 0.5698402910) % 1);
+    const [theta, phi] = [(v / height) * Math.PI, 2 * Math.PI * (0.5 - u / width)];
     return [Math.sin(theta) * Math.cos(phi), Math.sin(theta) * Math.sin(phi), Math.cos(theta)];
   });
 }
