@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from painted_ball import heights, photos, sky, with_textures
+from splitnerf.data.asset import Asset
 from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
@@ -183,19 +184,21 @@ DIELECTRICS = (
 FAINT_METAL = (((0.25, 0.2, 0.5), (0.03, 0.6, 0.0)), 1.0)
 
 
+def ball_of(ball: Asset, *halves: tuple) -> Asset:
+    """A ball with an albedo, a roughness and a metallic on its upper and its lower half."""
+    texels = AssetTexels(ball)
+    values = texels.start.clone()
+    upper, lower = (torch.tensor([*np.broadcast_to(half[0], 3), *half[1:]], dtype=torch.float32) for half in halves)
+    values[:, :5] = torch.where(heights(texels) > 0, upper, lower)
+    return texels.asset_with(texels.maps(values))
+
+
 @pytest.mark.parametrize("truth, trained, level", [(*DIELECTRICS, 2.0), (FAINT_METAL, FAINT_METAL, 1.0)])
 def test_photos_judge_whether_the_light_is_too_dark(ball, truth, trained, level):
     """Black clay beside a glossy metal with the F0 of a dielectric under too dark a light: its own F0 says that the light is right."""
 
-    def made(halves):
-        texels = AssetTexels(ball)
-        values = texels.start.clone()
-        upper, lower = (torch.tensor([half[0]] * 3 + list(half[1:])) for half in halves)
-        values[:, :5] = torch.where(heights(texels) > 0, upper, lower)
-        return texels.asset_with(texels.maps(values))
-
-    data = photos(made(truth[0]), truth[1] * sky())
-    fit = Refinement(data, made(trained[0]), trained[1] * sky(), SETTINGS)
+    data = photos(ball_of(ball, *truth[0]), truth[1] * sky())
+    fit = Refinement(data, ball_of(ball, *trained[0]), trained[1] * sky(), SETTINGS)
     start, found = fit.unknowns, level_of_light(fit.texels.start)
     held = fit.find_level(fit.held_errors())
     assert found > 1.9 and fit.level == pytest.approx(level, rel=0.05)
@@ -203,3 +206,17 @@ def test_photos_judge_whether_the_light_is_too_dark(ball, truth, trained, level)
     assert torch.equal(fit.unknowns, start) == (level == 1)
     light = fit.light.radiance().mean() / torch.from_numpy(trained[1] * sky()).mean()
     assert float(light) == pytest.approx(fit.level, rel=1e-3)
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_grey_metal_gives_its_tint_to_the_light_unless_photos_show_the_light(ball, seen):
+    tint = np.float32([1.25, 1.0, 0.8])
+    asset = ball_of(ball, (0.55 * tint, 0.3, 1.0), ((0.3, 0.1, 0.1), 0.5, 0.0))
+    data = photos(asset, sky())
+    around = np.concatenate([sky(), np.ones_like(sky()[..., :1])], axis=2)
+    data = replace(data, surroundings=around) if seen else data
+    fit = Refinement(data, asset, sky(), SETTINGS)
+    radiance, albedo = fit.light.radiance().numpy(), fit.texels.start[:, :3].numpy()
+    assert fit.tint.tolist() == pytest.approx([1, 1, 1] if seen else tint.tolist(), rel=0.01)
+    np.testing.assert_allclose(radiance.mean((0, 1)), sky().mean((0, 1)) * fit.tint.numpy(), rtol=1e-3)
+    np.testing.assert_allclose(albedo * fit.tint.numpy(), AssetTexels(asset).start[:, :3].numpy(), rtol=1e-5)

@@ -111,6 +111,12 @@ def test_channels_are_found_by_their_names(tmp_path, capsys, names):
         assert read_radiance(tmp_path / "x.exr")[0, 0] == pytest.approx(expected[:3])
 
 
+def test_an_image_of_luminance_and_differences_of_colours_is_refused(tmp_path):
+    write_exr(tmp_path / "x.exr", np.ones((4, 4, 3), np.float32), ("Y", "RY", "BY"))
+    with pytest.raises(InputError, match=r"x.exr: holds luminance .*; re-export it as R, G, B"):
+        read_image(tmp_path / "x.exr")
+
+
 def test_the_layer_that_is_named_as_a_picture_is_taken(tmp_path):
     """A renderer's layers stand in the order of their names."""
     passes = [f"View.{layer}.{c}" for layer in ("AO", "Combined", "Env") for c in "RGB"]

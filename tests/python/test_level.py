@@ -1,10 +1,10 @@
-"""The level of the light by what dielectrics reflect."""
+"""The level of the light by what dielectrics reflect, and its tint by metals."""
 
 import math
 
 import pytest
 import torch
-from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light, rest_level
+from splitnerf.refinement.level import DIELECTRIC, at_level, level_of_light, rest_level, tint_of_light
 
 
 def texture_values(albedo: torch.Tensor, metallic: torch.Tensor, rough: float = 0.3) -> torch.Tensor:
@@ -77,3 +77,30 @@ def test_a_lamp_that_mirrors_have_shown_darkens_what_scatters_and_leaves_the_res
     torch.testing.assert_close(clay_now[:, :3], clay[:, :3] / gain)
     torch.testing.assert_close(metal_now[:, :3], METAL[:, :3] * (0.95 + 0.05 / gain))
     assert torch.equal(at_level(faint, 1.0, gain)[:, 3:], faint[:, 3:])
+
+
+def metals(*colours: tuple[float, float, float]) -> torch.Tensor:
+    """[30 n, 8] values of metals of n colours."""
+    values = METAL[:30].repeat(len(colours), 1)
+    values[:, :3] = torch.tensor(colours).repeat_interleave(30, 0)
+    return values
+
+
+STEEL, COPPER, RED = (0.56, 0.57, 0.58), (0.955, 0.638, 0.538), (0.6, 0.1, 0.1)
+
+
+def test_much_grey_metal_tells_the_tint_of_the_light():
+    tint = torch.tensor([1.25, 1.0, 0.8])
+    paint = texture_values(torch.full((100,), 0.5), torch.zeros(100))
+    seen = metals(STEEL, COPPER, RED)
+    seen[:, :3] *= tint
+    steel = torch.tensor(STEEL) / torch.tensor(STEEL).log().mean().exp()
+    torch.testing.assert_close(tint_of_light(torch.cat([seen[:30], paint])), tint * steel)
+    for values in (seen[30:], torch.cat([seen, paint]), paint):  # coloured, too few, none
+        assert tint_of_light(values).tolist() == [1, 1, 1]
+
+
+def test_metals_of_many_faint_colours_tell_no_tint():
+    draw = torch.Generator().manual_seed(1)
+    many = metals(*(0.5 * torch.exp(0.3 * torch.randn(40, 3, generator=draw))).tolist())
+    assert tint_of_light(many).tolist() == [1, 1, 1]

@@ -210,6 +210,12 @@ def print_refinement(summary: dict | None) -> None:
         print("a lamp that training had smeared was made compact first; photos do not tell which of the two it was")
     if summary["level"] != 1:
         print(f"the light was made {summary['level']:.2f} times as bright, as highlights ask")
+    if max(summary["tint"]) > 1:
+        print(
+            "the metal of one faint colour is taken for grey, and the light for {:.2f} {:.2f} {:.2f}".format(
+                *summary["tint"]
+            )
+        )
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
     if summary["detail"]:

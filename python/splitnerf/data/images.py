@@ -239,8 +239,12 @@ def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
             raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
         pixels, kept = np.asarray(pixels).reshape(spec.height, spec.width, -1), _channels(spec)
         if len(kept) < spec.nchannels:
-            others = ", ".join(name for i, name in enumerate(spec.channelnames) if i not in kept)
-            note_once(f"{path.parent}: channels of images are not used: {others}", path.name)
+            others = [channel for i, channel in enumerate(spec.channelnames) if i not in kept]
+            if {"RY", "BY"} <= set(others):
+                raise InputError(
+                    f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B"
+                )
+            note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
         primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None

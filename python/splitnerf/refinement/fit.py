@@ -30,7 +30,7 @@ from splitnerf.ops.shading import monte_carlo_light, shade_sums
 from splitnerf.ops.visibility import TexturedSurface, incoming_light
 from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp, power_of
-from splitnerf.refinement.level import at_level, level_of_light, rest_level
+from splitnerf.refinement.level import at_level, level_of_light, rest_level, tint_of_light
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
@@ -163,6 +163,7 @@ class Refinement:
 
     Attributes:
         patch_width: See :func:`splitnerf.refinement.texels.patch_width`.
+        tint: [3] See :func:`splitnerf.refinement.level.tint_of_light`; 1 where photos show what else shines on the object.
         sightings: How many pixels of all photos there are for each pixel's width squared of the surface, on average.
     """
 
@@ -200,7 +201,9 @@ class Refinement:
         )
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
-        self.trained = self.texels.start, torch.from_numpy(environment)
+        self.tint = tint_of_light(self.texels.start) if self.seen is None else torch.ones(3)
+        albedo, others = self.texels.start.split([3, 5], dim=1)
+        self.trained = torch.cat([albedo / self.tint, others], dim=1), torch.from_numpy(environment) * self.tint
         self.begin_at(1.0)
 
     def begin_at(self, level: float, lamp_gain: float = 1.0) -> None:

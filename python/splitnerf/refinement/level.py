@@ -1,9 +1,13 @@
-"""The level of the light, by what dielectrics reflect.
+"""The level of the light, by what dielectrics reflect, and its tint, by metals.
 
 Photos fix the products of light and reflectance. Under a light that is too dark by a factor, each dielectric reflects more
 than the DIELECTRIC share that it must at normal incidence: training makes it a faint or a dark metal. No metal is that
 dark (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2), so the reflectance on which most of what is no metal
 agrees tells the factor. Only glossy surfaces tell it: the lobe of a rough metal looks like what clay scatters.
+
+Training takes light for grey, and gives the light's tint to the metal that mirrors it. But steel, chromium, aluminium and silver
+are grey, and of the others in that table only nickel, titanium and platinum are nearly so: much metal of one faint colour is
+grey metal in a light of that colour.
 """
 
 from __future__ import annotations
@@ -17,6 +21,10 @@ GLOSSY = 0.4  # roughness below which F0 is told from what is scattered
 AGREE = 0.15  # difference of logarithms of F0 up to which texels agree: all dielectrics have one F0, dark metals many
 LEAST_SHARE = 0.1  # of all texels that must agree
 LEAST_FACTOR = 1.05  # below which the level stays
+METAL = 0.8  # metallic from which on a texel is metal
+# Differences of logarithms: of a faint colour's channels (copper's are 0.57), and of texels' colours up to which they agree. The share of all texels
+# that must agree: 0.24 and 0.95 of two objects with grey metal, 0.06 to 0.15 of eight of many-coloured metal.
+FAINT, ONE_COLOUR, LEAST_GREY = 0.45, 0.1, 0.2
 
 
 def level_of_light(values: Tensor) -> float:
@@ -32,6 +40,21 @@ def level_of_light(values: Tensor) -> float:
     n_agreeing, middle = (torch.searchsorted(found, found + AGREE, right=True) - first).max(0)
     factor = float(found[first[middle] :][:n_agreeing].median().exp())
     return factor if factor >= LEAST_FACTOR and n_agreeing >= LEAST_SHARE * len(values) else 1.0
+
+
+def tint_of_light(values: Tensor) -> Tensor:
+    """[3] the factors on the light's colours, of geometric mean 1, with which metal of a faint colour is grey; 1 where too few texels agree on one.
+
+    Args:
+        values: [m, 8] texture values, as of :func:`level_of_light`.
+    """
+    logs = values[values[:, 4] > METAL, :3].clamp(min=1e-3).log()
+    colours = (logs - logs.mean(1, keepdim=True))[logs.amax(1) - logs.amin(1) < FAINT]
+    if len(colours) == 0:
+        return torch.ones(3)
+    middle = colours.median(0).values
+    n_agreeing = int(((colours - middle).abs().amax(1) < ONE_COLOUR).sum())
+    return (middle - middle.mean()).exp() if n_agreeing >= LEAST_GREY * len(values) else torch.ones(3)
 
 
 def rest_level(level: float, lamp_gain: float) -> float:

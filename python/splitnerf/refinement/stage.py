@@ -44,7 +44,8 @@ class Refined:
         delivered: The number of the sweep that is delivered; 0 for the start.
         saturated: The share of the covered pixels' values that the photos clip.
         lamp: The lamp that was made compact at the start, or None.
-        level: The factor by which the light was made brighter at the start, see :mod:`splitnerf.refinement.level`; 1: it was not.
+        level, tint: The factors by which the light was made brighter and coloured at the start, see :mod:`splitnerf.refinement.level`; 1:
+            it was not.
         detail: The edge of the albedo's texture, which has the photos' detail; None where it has none.
     """
 
@@ -57,6 +58,7 @@ class Refined:
     saturated: float
     lamp: CompactLamp | None
     level: float
+    tint: list[float]
     detail: int | None
 
 
@@ -286,6 +288,5 @@ class Stage:
             )
         held = (self.held_start, float(np.mean(chosen.held)) / (1.0 if chosen.number else self.unseen))
         saturated = float(fit.pixels.saturated.mean())
-        return Refined(
-            asset, light, self.outline, self.sweeps, held, chosen.number, saturated, self.lamp, fit.level, size
-        )
+        found = self.lamp, fit.level, fit.tint.tolist()
+        return Refined(asset, light, self.outline, self.sweeps, held, chosen.number, saturated, *found, size)
