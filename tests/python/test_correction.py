@@ -129,7 +129,7 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     torch.testing.assert_close(ray.mean - without, torch.tensor([1.0, 0.0, 3.0])[:, None].expand(3, 3))
     assert found.packed.ray_indices[ray.shaded[asked["candidates"]]].tolist() == [0, 2]
     assert ray.sdf.abs().max() > 0.01
-    torch.testing.assert_close(asked["on_surface"], ray.positions - ray.normals * ray.sdf[:, None])
+    torch.testing.assert_close(asked["on_surface"], ray.positions - ray.points.normals * ray.sdf[:, None])
 
 
 def test_a_corrected_picture_moves_all_its_parts():

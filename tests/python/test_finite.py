@@ -189,7 +189,7 @@ def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
     """Whatever comes first, all that follows from it is bad as well."""
     names = [f"rays' {name}" for name in ("rays_o", "rays_d", "target", "background")] + ["parameter weight"]
     points = ("albedo", "radiance")
-    names += [f"rendered {x}" for x in ("sdf", "gradients", "normals", "weights", *points, "mean", "opacity")]
+    names += [f"rendered {x}" for x in ("sdf", "gradients", "weights", *points, "mean", "opacity")]
 
     def explained(first_bad: int) -> str:
         def of(start: str) -> dict[str, torch.Tensor]:

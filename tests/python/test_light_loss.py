@@ -113,11 +113,10 @@ def occlusion_rays(n: int, channels: int = 1) -> SimpleNamespace:
     """Samples whose number stands in all that belongs to them; factors are off 0.5 by 0.002 and -0.004 of it."""
     number = torch.arange(float(n))
     column = number[:, None]
-    points = SimpleNamespace(roughness=column)
+    points = SimpleNamespace(roughness=column, normals=column + torch.tensor([0.0, 0.5, 0.0]))
     points.occlusion_d, points.occlusion_s = ((0.5 + x * column).expand(-1, channels) for x in (0.002, -0.004))
-    normals, sdf = column + torch.tensor([0.0, 0.5, 0.0]), torch.full((n,), 0.5)
     rest = {"shaded": torch.arange(n), "shares": 1.0 + number, "positions": column.expand(-1, 3)}
-    return SimpleNamespace(**rest, sdf=sdf, normals=normals, points=points)
+    return SimpleNamespace(**rest, sdf=torch.full((n,), 0.5), points=points)
 
 
 @pytest.mark.parametrize("channels", [1, 3])

@@ -152,7 +152,7 @@ def test_values_of_shaded_samples_are_those_of_their_places():
     field = model.surface(ray.positions)
     torch.testing.assert_close(ray.positions, found.positions[ray.shaded])
     torch.testing.assert_close(ray.sdf, field.sdf)
-    torch.testing.assert_close(ray.normals, unit(field.gradient))
+    torch.testing.assert_close(ray.points.normals, unit(field.gradient))
     rays = found.packed.ray_indices[ray.shaded]
     torch.testing.assert_close(torch.zeros(20).index_add(0, rays, ray.shares), ray.opacity)
     colours = torch.zeros(20, 3).index_add(0, rays, ray.shares[:, None] * ray.points.radiance) / ray.opacity[

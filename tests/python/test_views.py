@@ -1,12 +1,13 @@
 """What views are made of: lengths of samples, maps channel by channel, the hull of masks, and what a model asks its occlusion."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 import torch
 from op_checks import generator, unit
 from splitnerf.config import preset
-from splitnerf.fields import Occlusion, RaySegments
+from splitnerf.fields import Occlusion
 from splitnerf.ops import HashGridSpec, light_queries
 from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED
 from splitnerf.render.model import SceneModel
@@ -143,7 +144,7 @@ def asked_by_shade(**settings) -> tuple:
     normals, views = (unit(torch.randn(40, 3, generator=g)) for _ in range(2))
     positions, outputs = torch.randn(40, 3, generator=g), torch.randn(40, 13, generator=g)
     features = torch.randn(40, model.sdf_field.grid.spec.n_outputs, generator=g)
-    segments = RaySegments(torch.tensor([0]), torch.zeros(40, dtype=torch.int64))
+    segments = SimpleNamespace(representatives=torch.tensor([0]), segment=torch.zeros(40, dtype=torch.int64))
     light = model.light.evaluate()
     points = model.shade(light, positions, outputs, features, normals, views, segments)
     return points, occlusion.asked, segments, normals, views, positions, outputs, features

@@ -1,6 +1,7 @@
 """What a model's visibility bits keep of a mesh and of the light, and which of it each answer is made of."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import torch
 import trimesh
 from mesh_shapes import between, bits_of, corners, grid_mesh, lattice, refresh, scene_of
 from op_checks import generator, unit
-from splitnerf.fields import Light, RaySegments, SkyCells, VisibilityBits
+from splitnerf.fields import Light, SkyCells, VisibilityBits
 from splitnerf.fields.light import lobe_roughness, panorama_directions
 from splitnerf.fields.occlusion import bit_counts
 from splitnerf.ops import light_queries
@@ -281,9 +282,10 @@ def test_a_segment_has_the_factors_of_its_leader():
     mesh = dented()
     bits, points = bits_on(mesh), points_on(mesh)
     representatives, segment = torch.tensor([70, 3, 41]), torch.randint(3, (80,), generator=generator(6))
+    segments = SimpleNamespace(representatives=representatives, segment=segment)
     lit_up(bits)
     alone = bits(*points)
-    for found, expected in zip(bits(*points, RaySegments(representatives, segment)), alone):
+    for found, expected in zip(bits(*points, segments), alone):
         assert torch.equal(found, expected[representatives[segment]]) and not torch.equal(found, expected)
 
 

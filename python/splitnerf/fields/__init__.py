@@ -1,5 +1,5 @@
 """The learned functions of space and direction: SDF, materials, occlusion factors and light."""
 
 from splitnerf.fields.light import EvaluatedLight, Light, LightMlp, LightPyramid
-from splitnerf.fields.occlusion import Occlusion, RaySegments, SkyCells, VisibilityBits
+from splitnerf.fields.occlusion import Occlusion, SkyCells, VisibilityBits
 from splitnerf.fields.surface import MaterialHead, OcclusionHead, SdfField

@@ -16,24 +16,13 @@ from splitnerf import _core
 from splitnerf.fields.light import CellLight, EvaluatedLight, Light, LightTexels, mean_over, texel_roughness
 from splitnerf.ops import MeshScene
 from splitnerf.ops.light import SparseMap, SparseRows, sparse_product
+from splitnerf.ops.rays import ShadingSubset
 from splitnerf.ops.visibility import VisibilityCache, cached_occlusion, cached_visibility
 
 TEXELS_PER_CELL = 8  # fewest texels per direction of a light without texels of its own
 LOBE_DIRECTIONS = 15  # fewest directions within a lobe that a sum over the directions resolves
 DIM = 1e-12  # power of a cell, W / m^2, below which its direction is that of its centre
 CHUNK = 1 << 15  # emitters whose mirrors are searched at a time
-
-
-class RaySegments(NamedTuple):
-    """Segments of rays, each on one surface, and the segment of each point.
-
-    Attributes:
-        representatives: [k] int64, the point that represents each segment.
-        segment: [n] int64, the segment of each point.
-    """
-
-    representatives: Tensor
-    segment: Tensor
 
 
 class Occlusion(NamedTuple):
@@ -244,7 +233,7 @@ class VisibilityBits:
         normals: Tensor,
         lobe_dirs: Tensor,
         roughness: Tensor,
-        segments: RaySegments | None = None,
+        segments: ShadingSubset | None = None,
     ) -> Occlusion:
         """The factors at points of the surface; the arguments are those of :func:`splitnerf.ops.visibility.cached_occlusion`. With
         segments, all points of one have the factors of its representative."""

@@ -18,7 +18,6 @@ from splitnerf.fields import (
     MaterialHead,
     Occlusion,
     OcclusionHead,
-    RaySegments,
     SdfField,
     SkyCells,
     VisibilityBits,
@@ -26,6 +25,7 @@ from splitnerf.fields import (
 from splitnerf.fields.light import lobe_roughness, mean_over
 from splitnerf.fields.surface import SdfSample
 from splitnerf.ops import HashGridSpec, MeshScene, light_queries, split_sum_shade
+from splitnerf.ops.rays import ShadingSubset
 from splitnerf.ops.shading import summed_correction
 from splitnerf.ops.visibility import cached_occlusion
 
@@ -186,14 +186,15 @@ class SceneModel(nn.Module):
         normals: Tensor,
         lobe_dirs: Tensor,
         roughness: Tensor,
-        segments: RaySegments | None = None,
+        segments: ShadingSubset | None = None,
     ) -> Occlusion:
         """The occlusion factors at points [n, 3] of the surface; no gradient flows into the geometry.
 
         Args:
             inputs: See :meth:`head_inputs`.
             positions, normals, lobe_dirs, roughness: See :class:`splitnerf.fields.VisibilityBits`.
-            segments: The ray segments of the points; cached visibility is looked up once for each. None: for every point.
+            segments: The points as samples of rays; cached visibility is looked up once for each segment of a ray. None: for
+                every point.
         """
         if self.bits is not None and not self.bits.is_unoccluded:
             return self.bits(positions, normals, lobe_dirs, roughness, segments)
@@ -210,7 +211,7 @@ class SceneModel(nn.Module):
         features: Tensor,
         normals: Tensor,
         view_dirs: Tensor,
-        segments: RaySegments | None = None,
+        segments: ShadingSubset | None = None,
     ) -> ShadedPoints:
         """Outgoing radiance of points towards the camera.
 

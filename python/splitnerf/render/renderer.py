@@ -11,7 +11,7 @@ from torch import Tensor
 
 from splitnerf.config import Config
 from splitnerf.data.dataset import Dataset
-from splitnerf.fields import EvaluatedLight, RaySegments
+from splitnerf.fields import EvaluatedLight
 from splitnerf.ops import composite, linear_to_srgb, march_rays, surface_weights
 from splitnerf.ops.rays import PackedSamples, ShadingSubset, spread_samples
 from splitnerf.ops.sdf import sample_rays
@@ -89,7 +89,6 @@ class RenderedRays:
         sizes: [3] int64, the numbers of shaded samples, of rays with samples and of ray segments.
         shares: [n_shaded] rendering weight that each shaded sample stands for, no gradient.
         positions: [n_shaded, 3] midpoints of the shaded samples, scene units.
-        normals: [n_shaded, 3] unit normals of the field.
         sdf: [n_shaded] signed distances, scene units.
         points: Materials, occlusion and radiance of the shaded samples.
     """
@@ -106,7 +105,6 @@ class RenderedRays:
     sizes: Tensor
     shares: Tensor
     positions: Tensor
-    normals: Tensor
     sdf: Tensor
     points: ShadedPoints
 
@@ -266,9 +264,8 @@ def render_rays(
     positions, directions, normals, outputs, features = (x.index_select(0, shaded) for x in of_samples)
     view_dirs = -directions
     sdf = outputs[:, 0]
-    segments = RaySegments(spread.representatives, spread.segment)
     turned = light if turns is None else light.turned(turns[samples.ray_indices.index_select(0, shaded)])
-    points = model.shade(turned, positions, outputs, features, normals, view_dirs, segments)
+    points = model.shade(turned, positions, outputs, features, normals, view_dirs, spread)
     radiance = points.radiance if c.shading.compositing == "linear" else linear_to_srgb(points.radiance).clamp(max=1.0)
     shares = spread.gather(weights.detach())
     mean = composite(weights, spread.interpolate(radiance), samples.offsets, opacity, MIN_OPACITY)
@@ -290,7 +287,6 @@ def render_rays(
         spread.sizes,
         shares,
         positions,
-        normals,
         sdf,
         points,
     )
@@ -328,8 +324,7 @@ def render_view(
         ray = render_rays(model, light, found, turns=None if turn is None else turn.expand(len(o), 3, 3))
         p = ray.points
         maps = torch.cat(
-            [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), ray.normals],
-            1,
+            [p.albedo, p.roughness, p.metallic, p.occlusion_d.mean(1, True), p.occlusion_s.mean(1, True), p.normals], 1
         )
         weighed = ray.shares[:, None] * torch.cat([maps, torch.ones_like(maps[:, :1])], 1)
         sums = weighed.new_zeros(len(o), weighed.shape[1]).index_add(0, found.packed.ray_indices[ray.shaded], weighed)

@@ -85,6 +85,6 @@ def _state(model: SceneModel, optimiser: torch.optim.Optimizer) -> Iterator[tupl
 def _data_flow(model: SceneModel, batch: Batch, ray: RenderedRays) -> Iterator[tuple[str, Tensor]]:
     yield from ((f"rays' {name}", getattr(batch, name)) for name in ("rays_o", "rays_d", "target", "background"))
     yield from ((f"parameter {name}", parameter) for name, parameter in model.named_parameters())
-    yield from ((f"rendered {name}", getattr(ray, name)) for name in ("sdf", "gradients", "normals", "weights"))
+    yield from ((f"rendered {name}", getattr(ray, name)) for name in ("sdf", "gradients", "weights"))
     yield from ((f"rendered {name}", values) for name, values in ray.points._asdict().items())
     yield from ((f"rendered {name}", getattr(ray, name)) for name in ("mean", "opacity"))

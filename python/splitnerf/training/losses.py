@@ -273,7 +273,7 @@ def occlusion_loss(
         return ray.shares.new_zeros(())
     predicted = ray.points.occlusion_d[chosen], ray.points.occlusion_s[chosen]
     with torch.no_grad():
-        normals, n_rays = ray.normals[chosen], c.constants.occlusion_rays
+        normals, n_rays = ray.points.normals[chosen], c.constants.occlusion_rays
         traced = occlusion_factors(
             scene,
             ray.positions[chosen] - normals * ray.sdf[chosen, None],
