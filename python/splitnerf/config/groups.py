@@ -123,7 +123,7 @@ class LightSettings:
 
     kind: str = setting("pyramid", "how the light is stored; mlp: the paper", choices=("mlp", "pyramid"))
     resolution: int = setting(
-        128, "texels along the edge of the pyramid's map", unit="texels", at_least=16, at_most=1024, power_of_2=True
+        128, "texels along the edge of the pyramid's map", unit="texels", choices=(16, 32, 64, 128, 256, 512, 1024)
     )
 
 
@@ -288,7 +288,7 @@ class Constants:
     occlusion_rays: int = number(32, at_least=1)  # for each of the two factors
     occlusion_environment_height: int = number(32, at_least=1, at_most=1 << 13)  # rows of the light that weighs them
     occlusion_offset: float = number(0.0125, at_most=FARTHEST)  # from the surface to the start of a ray
-    occlusion_directions: int = number(256, at_least=64, at_most=1024, multiple_of=32)
+    occlusion_directions: int = number(256, choices=range(64, 1025, 32))
     open_below: float = number(0.02)  # if no vertex has a larger blocked share, occlusion is skipped
     indirect_every: int = number(200, at_least=1)  # steps
     # samples

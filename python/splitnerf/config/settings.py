@@ -58,9 +58,31 @@ class Config:
                 raise InputError(f"{name} takes a value of type {known.type}, got {value!r}")
             if not limits.allow(value):
                 raise InputError(f"{name} must be {limits}, got {value!r}")
-        for broken, message in RULES:
-            if broken(self):
-                raise InputError(message)
+        for message in self._conflicts():
+            raise InputError(message)
+
+    def _conflicts(self) -> Iterator[str]:
+        """What is wrong with settings that exclude each other."""
+        run, shading, occlusion = self.run, self.shading, self.occlusion
+        summable = occlusion.kind == "bits" and shading.compositing == "linear" and shading.fresnel == "exact"
+        if shading.method == "summed" and not (summable and self.constants.occlusion_directions >= SUMMED_DIRECTIONS):
+            yield (
+                f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} "
+                "constants.occlusion_directions, shading.compositing = linear and shading.fresnel = exact; "
+                "set shading.method=split"
+            )
+        if self.exposure.refine == "yes" and shading.compositing != "linear":
+            yield "exposure.refine = yes needs shading.compositing = linear; set exposure.refine=no"
+        if self.finest_cells >= MOST_CELLS:
+            yield f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth"
+        if run.deterministic and run.max_minutes > 0:
+            yield "a deterministic run ends by its steps alone; leave out --max-minutes (run.max_minutes) and give --steps"
+        fixed = self.light.kind == "pyramid" and occlusion.kind != "mlp" and self.surface.normals == "analytic"
+        if run.cuda_graphs and not (fixed and self.constants.entropy_points > 1):
+            yield (
+                "run.cuda_graphs needs light.kind = pyramid, occlusion.kind = bits or off, surface.normals = analytic and "
+                "more than one of constants.entropy_points; set run.cuda_graphs=false"
+            )
 
     def __getitem__(self, name: str) -> object:
         """The value of a setting by its name, or by a short one, see :data:`SHORT_NAMES`."""
@@ -127,48 +149,6 @@ SHORT_NAMES = {name.replace(".", "_"): name for name in FIELDS} | {
 }
 """Short names of settings: `light_resolution` for `light.resolution`; and by the name in the group alone where no other group
 has it, or the group is `run`: `n_levels` for `surface.n_levels`."""
-
-# Settings that exclude each other: the condition and the message.
-RULES = (
-    (
-        lambda c: (
-            c.shading.method == "summed"
-            and not (
-                c.occlusion.kind == "bits"
-                and c.shading.compositing == "linear"
-                and c.shading.fresnel == "exact"
-                and c.constants.occlusion_directions >= SUMMED_DIRECTIONS
-            )
-        ),
-        f"shading.method = summed needs occlusion.kind = bits with at least {SUMMED_DIRECTIONS} constants.occlusion_directions, "
-        "shading.compositing = linear and shading.fresnel = exact; set shading.method=split",
-    ),
-    (
-        lambda c: c.exposure.refine == "yes" and c.shading.compositing != "linear",
-        "exposure.refine = yes needs shading.compositing = linear; set exposure.refine=no",
-    ),
-    (
-        lambda c: c.finest_cells >= MOST_CELLS,
-        f"a level of the hash grid needs fewer than {MOST_CELLS} cells along an edge; lower surface.growth",
-    ),
-    (
-        lambda c: c.run.deterministic and c.run.max_minutes > 0,
-        "a deterministic run ends by its steps alone; leave out --max-minutes (run.max_minutes) and give --steps",
-    ),
-    (
-        lambda c: (
-            c.run.cuda_graphs
-            and (
-                c.occlusion.kind == "mlp"
-                or c.light.kind == "mlp"
-                or c.surface.normals != "analytic"
-                or c.constants.entropy_points == 1
-            )
-        ),
-        "run.cuda_graphs needs light.kind = pyramid, occlusion.kind = bits or off, surface.normals = analytic and "
-        "more than one of constants.entropy_points; set run.cuda_graphs=false",
-    ),
-)
 
 
 def settings_table(config: Config) -> str:
