@@ -5,22 +5,16 @@ This package imports nothing of it: :func:`installed` looks for it when the prog
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.util import find_spec
 from pkgutil import resolve_name
-from typing import Any, Protocol
+from types import ModuleType
+from typing import Any
 
 TITLES = ("data", "reconstruction", "results", "many runs", "this installation")  # of `splitnerf --help`, in order
-
-
-class Command(Protocol):
-    """A module that adds one command; the parser's default ``execute`` runs it and returns the exit code."""
-
-    def add_parser(self, commands: argparse._SubParsersAction) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -28,7 +22,8 @@ class Plugin:
     """What a package adds. A hook that is None is left out of the job.
 
     Attributes:
-        commands: Modules by the title of their group in the help, one of :data:`TITLES`.
+        commands: Modules by the title of their group in the help, one of :data:`TITLES`. Each has ``add_parser(commands)``, which
+            adds one command to argparse's; the parser's default ``execute`` runs it and returns the exit code.
         find_masks: ``(train, test, folder, *, steps, minutes, seed) -> seconds``: writes masks for the photos of both
             :class:`splitnerf.data.dataset.Dataset` into the folder. Without it photos need masks.
         write_report: ``(run, model, evaluated, timings)``: writes report.html into a run's folder.
@@ -37,7 +32,7 @@ class Plugin:
         failing_operators: ``(device) -> (names of those that fail, number of those tested)``.
     """
 
-    commands: Mapping[str, tuple[Command, ...]] = field(default_factory=dict)
+    commands: Mapping[str, tuple[ModuleType, ...]] = field(default_factory=dict)
     find_masks: Callable[..., float] | None = None
     write_report: Callable[..., None] | None = None
     watch: Callable[[str, int], AbstractContextManager[Any]] | None = None
