@@ -154,7 +154,10 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     """
     c, draw = config.constants, {"generator": generator, "device": generator.device}
     queries = F.normalize(torch.randn(c.light_queries, 3, **draw), dim=1)
-    directions = light_directions(config, generator)
+    if c.light_set == "fibonacci":
+        directions = fibonacci_directions(c.light_samples, generator)
+    else:
+        directions = F.normalize(torch.randn(c.light_samples, 3, **draw), dim=1)
     roughness = torch.ones_like(queries[:, :1])
     roughness[: c.light_queries // 2] = torch.rand(c.light_queries // 2, 1, **draw).sort(0).values  # narrow lobes first
     n_narrow = int((roughness < c.light_lobe_below).sum()) if c.light_lobe_below > 0 else 0
@@ -167,14 +170,6 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
     if c.light_form == "square":
         return error.square().sum(-1).mean()
     return F.smooth_l1_loss(error, torch.zeros_like(error), reduction="none").sum(-1).mean()
-
-
-def light_directions(config: Config, generator: torch.Generator) -> Tensor:
-    """The ``light_samples`` directions [n, 3] that the light loss integrates over."""
-    n = config.constants.light_samples
-    if config.constants.light_set == "fibonacci":
-        return fibonacci_directions(n, generator)
-    return F.normalize(torch.randn(n, 3, generator=generator, device=generator.device), dim=1)
 
 
 def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor) -> Tensor:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import linear_to_srgb, over_background, write_image
+from splitnerf.data.images import area_average, linear_to_srgb, over_background, write_image
 from splitnerf.files import atomic_path, reason
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid
@@ -92,9 +92,7 @@ def write_preview(run: Path, model: SceneModel, grid: OccupancyGrid, dataset: Da
     factor = math.ceil(max(dataset.height, dataset.width) / PREVIEW_EDGE)
     maps = render_maps(model, grid, dataset, 0, factor)
     photo = over_background(dataset.images[0, ..., :3], dataset.images[0, ..., 3])
-    height, width = maps["alpha"].shape
-    blocks = photo[: height * factor, : width * factor].reshape(height, factor, width, factor, 3)
-    panels = [blocks.mean(axis=(1, 3))] + [
+    panels = [area_average(photo, factor)] + [
         over_background(rgb, maps["alpha"])
         for rgb in (maps["rgb"], linear_to_srgb(maps["albedo"]), 0.5 * maps["normal"] + 0.5)
     ]

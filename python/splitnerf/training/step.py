@@ -107,18 +107,9 @@ class PendingNumbers:
         values, (norm, samples, shaded, _, segments, evaluated, s) = (
             part.tolist() for part in numbers.tensor_split([len(self.weights)])
         )
-        counts = Capacity(samples, shaded, segments)
-        return StepNumbers(
-            self.step,
-            self.n_rays,
-            dict(zip(self.weights, values)),
-            self.weights,
-            norm,
-            counts,
-            s,
-            evaluated,
-            self.capacity.holds(counts),
-        )
+        counts, of_terms = Capacity(samples, shaded, segments), dict(zip(self.weights, values))
+        complete = self.capacity.holds(counts)
+        return StepNumbers(self.step, self.n_rays, of_terms, self.weights, norm, counts, s, evaluated, complete)
 
 
 class Step:
