@@ -34,13 +34,9 @@ def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
     def near_edge(i: int) -> np.ndarray:
         alpha = dataset.images[i, ..., 3]
         partly = (alpha > 0.01) & (alpha < 0.99)
-        inside = alpha > 0.5
-        for axis in (0, 1):  # a mask without partly covered pixels has edges too
-            change = np.diff(inside, axis=axis)
-            pad = [(0, 0)] * 2
-            pad[axis] = (0, 1)
-            partly |= np.pad(change, pad)
-        near = binary_dilation(partly, np.ones((3, 3), bool))
+        inside = alpha > 0.5  # a mask without partly covered pixels has edges too
+        edge = np.diff(inside, axis=0, append=inside[-1:]) | np.diff(inside, axis=1, append=inside[:, -1:])
+        near = binary_dilation(partly | edge, np.ones((3, 3), bool))
         return near if dataset.known is None else near & dataset.known[i]
 
     pixels = pixels_of(dataset, near_edge, MOST)

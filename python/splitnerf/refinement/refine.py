@@ -243,27 +243,24 @@ def record_of(refined: Refined, seconds: float) -> dict:
 def refinement_summary(run: Path) -> dict:
     """The changes by the refinement of a run; pairs are before and after."""
     try:
-        return _summary(read_json(run / RECORD, "sweeps"))
+        record = read_json(run / RECORD, "sweeps")
+        sweeps, outline = record["sweeps"], record["outline"]
+        return {
+            "steps": len(sweeps),
+            "seconds": record["seconds"],
+            "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
+            "outline_error": [outline[0], outline[-1]] if outline else None,
+            "held_out_psnr": [decibels(error) for error in record["held_out"]],
+            "delivered": record["delivered"],
+            "level": float(record["level"]),
+            "tint": record.get("tint", [1.0, 1.0, 1.0]),
+            "normal_texture": record["normal_texture"],
+            "detail": record["detail"],
+            "lamp": record["lamp"] is not None,
+            "saturated": record["saturated"],
+        }
     except (KeyError, TypeError, IndexError, ValueError, OverflowError):
         raise InputError(f"{run / RECORD}: is damaged; refine the run again") from None
-
-
-def _summary(record: dict) -> dict:
-    sweeps, outline = record["sweeps"], record["outline"]
-    return {
-        "steps": len(sweeps),
-        "seconds": record["seconds"],
-        "photos_psnr": [decibels(sweeps[i]["error"]) for i in (0, -1)],
-        "outline_error": [outline[0], outline[-1]] if outline else None,
-        "held_out_psnr": [decibels(error) for error in record["held_out"]],
-        "delivered": record["delivered"],
-        "level": float(record["level"]),
-        "tint": record.get("tint", [1.0, 1.0, 1.0]),
-        "normal_texture": record["normal_texture"],
-        "detail": record["detail"],
-        "lamp": record["lamp"] is not None,
-        "saturated": record["saturated"],
-    }
 
 
 def forget_state(folder: Path) -> None:

@@ -88,10 +88,6 @@ class Candidate(NamedTuple):
     unknowns: torch.Tensor
     light: list[torch.Tensor]
 
-    def is_worse(self, other: Candidate) -> bool:
-        """Whether the errors are clearly larger than another's."""
-        return is_worse(self.held, other.held)
-
 
 def decibels(error: float) -> float:
     """The PSNR of a mean squared error, which may come out as 0 or less where it is estimated."""
@@ -268,15 +264,12 @@ class Stage:
         judge.light.levels = chosen.light
         judge.unknowns = chosen.unknowns.clone()
         judge.unknowns[:, -2:] = 0.0  # tilts
-        held = [error / (1.0 if chosen.number else self.unseen) for error in chosen.held]
-        return Candidate(0, judge.held_errors().tolist(), judge.unknowns, chosen.light).is_worse(
-            chosen._replace(held=held)
-        )
+        return is_worse(judge.held_errors(), np.array(chosen.held) / (1.0 if chosen.number else self.unseen))
 
     def result(self) -> Refined:
         """The result so far."""
         fit, size = self.fit, self.albedo_size
-        chosen = self.best if self.last.is_worse(self.best) else self.last
+        chosen = self.best if is_worse(self.last.held, self.best.held) else self.last
         asset = fit.texels.asset_with(fit.texels.maps(to_values(chosen.unknowns)))
         if not self.normals_show(chosen):
             asset = replace(asset, materials=[replace(asset.materials[0], normal_texture=None)])

@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional as F
 from trimesh.graph import connected_component_labels
 
-from splitnerf.data.asset import Asset
+from splitnerf.data.asset import Asset, unit
 from splitnerf.data.dataset import Dataset
 from splitnerf.data.lens import pixel_width
 from splitnerf.export.bake import Texels, nearest_rows, rasterise
@@ -134,8 +134,7 @@ class AssetTexels:
         weights = np.stack([1 - u - v, u, v], axis=1)[..., None]
         mean = lambda values: (values[corners] * weights).sum(axis=1)  # noqa: E731
         p0, p1, p2 = (a.vertices[corners[:, i]] for i in range(3))
-        geometric = np.cross(p1 - p0, p2 - p0)
-        geometric /= np.maximum(np.linalg.norm(geometric, axis=1, keepdims=True), 1e-20)
+        geometric = unit(np.cross(p1 - p0, p2 - p0))
         geometric *= np.where((geometric * view_dirs).sum(axis=1, keepdims=True) < 0, -1, 1)
         smooth, tangents = mean(a.normals), mean(a.tangents[:, :3])
         bitangents = np.cross(smooth, tangents) * a.tangents[corners[:, 0], 3:]
@@ -220,7 +219,7 @@ def across_seams(inside: np.ndarray, chart: np.ndarray, positions: np.ndarray, n
         positions[border], SEAM_CANDIDATES, distance_upper_bound=SEAM_REACH * spacing
     )
     first, second = np.repeat(border, SEAM_CANDIDATES), np.append(border, -1)[found.ravel()]
-    near = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+    near = unit(normals)
     good = np.isfinite(distances.ravel()) & (chart[first] != chart[second])
     good &= (near[first] * near[second]).sum(axis=1) > SEAM_COSINE
     nearest = np.full(len(chart), -1)
@@ -231,7 +230,7 @@ def across_seams(inside: np.ndarray, chart: np.ndarray, positions: np.ndarray, n
 
 def frames_of(normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
     """[m, 2, 3] the axes x and y of tangent space at texels with normals [m, 3] and tangents [m, 4], of any length."""
-    normals, x = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-20) for v in (normals, tangents[:, :3]))
+    normals, x = unit(normals), unit(tangents[:, :3])
     return np.stack([x, np.cross(normals, x) * np.sign(tangents[:, 3:])], axis=1)
 
 
