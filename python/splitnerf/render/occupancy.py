@@ -136,11 +136,10 @@ class AveragedGrid(OccupancyGrid):
 
 def make_grid(config: Config, hull: Tensor | None = None, device: torch.device | str = "cpu") -> OccupancyGrid:
     """The grid that the setting ``occupancy`` names."""
+    resolution, c = config.sampling.grid_resolution, config.constants
     if config.sampling.occupancy == "average":
-        return AveragedGrid(
-            config.sampling.grid_resolution, config.constants.box, config.constants.min_step, hull, device
-        )
-    return OccupancyGrid(config.sampling.grid_resolution, config.constants.box, hull, device)
+        return AveragedGrid(resolution, c.box, c.min_step, hull, device)
+    return OccupancyGrid(resolution, c.box, hull, device)
 
 
 def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
