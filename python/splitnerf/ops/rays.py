@@ -326,14 +326,10 @@ def composite(
     return lib.composite(weights, values, offsets, opacity, least_opacity)
 
 
-def _fake_march(rays_o, rays_d, jitter, cells, box, step, max_samples):
-    n = torch.library.get_ctx().new_dynamic_size()
-    return (
-        rays_o.new_empty(n, dtype=torch.int64),
-        rays_o.new_empty(n),
-        rays_o.new_empty(n),
-        rays_o.new_empty(rays_o.shape[0] + 1, dtype=torch.int64),
-    )
+def fake_packed(rays_o: Tensor, n: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """:class:`PackedSamples` of n samples without their values, for the fake implementations."""
+    offsets = rays_o.new_empty(rays_o.shape[0] + 1, dtype=torch.int64)
+    return offsets.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n), offsets
 
 
 def _fake_spread(weights, t, offsets, phase, gap, per_ray, max_shaded=-1, max_stretches=-1, unit=None):
@@ -375,7 +371,7 @@ def _fake_surface(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmitt
     return gradient.new_empty(n, 3), sdf.new_empty(n), sdf.new_empty(rays_d.shape[0])
 
 
-register("march_rays", fake=_fake_march)
+register("march_rays", fake=lambda rays_o, *rest: fake_packed(rays_o, torch.library.get_ctx().new_dynamic_size()))
 register("surface_weights", fake=_fake_surface, setup_context=_keep_surface, backward=_surface_backward)
 register(
     "surface_weights_backward",

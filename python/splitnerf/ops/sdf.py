@@ -20,7 +20,7 @@ from torch.optim.optimizer import register_optimizer_step_post_hook
 
 from splitnerf import _core
 from splitnerf.ops._library import front, lib, refuse_gradients, register
-from splitnerf.ops.rays import PackedSamples
+from splitnerf.ops.rays import PackedSamples, fake_packed
 
 
 @dataclass(frozen=True)
@@ -394,15 +394,8 @@ def sample_rays(
 
 def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
     n = rest[-1] or torch.library.get_ctx().new_dynamic_size()
-    long, n_rays = torch.int64, rays_o.shape[0]
-    return (
-        rays_o.new_empty(n, dtype=long),
-        rays_o.new_empty(n),
-        rays_o.new_empty(n),
-        rays_o.new_empty(n_rays + 1, dtype=long),
-        rays_o.new_empty(n_rays, dtype=long),
-        rays_o.new_empty((), dtype=long),
-    )
+    evaluated = rays_o.new_empty(rays_o.shape[0], dtype=torch.int64)
+    return *fake_packed(rays_o, n), evaluated, evaluated.new_empty(())
 
 
 def _keep_field(ctx, inputs, output):

@@ -397,12 +397,9 @@ def incoming_light(
     return IncomingLight(directions, pdf, visible, sent)
 
 
-register(
-    "incoming_light",
-    fake=lambda scene, positions, *rest: (
-        positions.new_empty(len(positions), rest[-4], 3),
-        positions.new_empty(len(positions), rest[-4]),
-        positions.new_empty(len(positions), rest[-4]),
-        positions.new_empty(len(positions), rest[-4], 3),
-    ),
-)
+def _fake_incoming(scene, positions, *rest):
+    n, k = positions.shape[0], rest[-4]  # the number of directions
+    return tuple(positions.new_empty(n, k, *own) for own in ((3,), (), (), (3,)))
+
+
+register("incoming_light", fake=_fake_incoming)
