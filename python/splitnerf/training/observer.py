@@ -6,16 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from splitnerf.data.images import read_image
 from splitnerf.errors import InputError, note
 from splitnerf.files import reason
-
-if TYPE_CHECKING:
-    from torch.utils.tensorboard import SummaryWriter
 
 
 class Request(Enum):
@@ -90,15 +87,12 @@ class TensorBoard:
         if event.kind == "begun":
             self._begin(event.training.step)
         elif event.kind == "logged":
-            numbers = {name: float(value) for name, value in event.line.items() if name != "step" and value is not None}
-            self._write(
-                lambda writer: [writer.add_scalar(name, value, event.line["step"]) for name, value in numbers.items()]
-            )
+            for name, value in event.line.items():
+                if name != "step" and value is not None:
+                    self._write("add_scalar", name, float(value), event.line["step"])
         elif event.kind == "previewed":
             pixels, step = np.ascontiguousarray(read_image(event.path)[..., :3]), event.training.step
-            self._write(
-                lambda writer: writer.add_image("photo, render, albedo, normals", pixels, step, dataformats="HWC")
-            )
+            self._write("add_image", "photo, render, albedo, normals", pixels, step, dataformats="HWC")
 
     def _begin(self, step: int) -> None:
         """Opens the file; its steps after the one that the run goes on from come again. Raises InputError where that is
@@ -112,14 +106,14 @@ class TensorBoard:
         self._writer = self._make(str(self._folder), purge_step=step + 1)
 
     def __exit__(self, *exception) -> None:
-        self._write(lambda writer: writer.close())
+        self._write("close")
 
-    def _write(self, write: Callable[[SummaryWriter], object]) -> None:
-        """Writes, as long as that is possible: a full disk ends the curves, not the training."""
+    def _write(self, method: str, *arguments: object, **options: object) -> None:
+        """Calls a method of the writer, as long as that is possible: a full disk ends the curves, not the training."""
         if self._writer is None:
             return
         try:
-            write(self._writer)
+            getattr(self._writer, method)(*arguments, **options)
         except OSError as error:
             self._writer = None
             note(f"{self._folder}: cannot be written ({reason(error)}); TensorBoard gets no more of this run")
