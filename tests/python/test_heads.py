@@ -42,7 +42,7 @@ def test_hidden_layers_keep_the_size_of_what_they_read_and_outputs_start_near_0(
 
 def test_materials_are_their_own_outputs():
     """Three of albedo, one of roughness, one of metallic: sigmoids, the roughness brought to [least, 1]."""
-    head = MaterialHead(4, 8, 1, min_roughness=0.2)
+    head = MaterialHead(4, 8, 1, 0.5, 0.2)
     logits = torch.tensor([-2.0, -0.5, 0.4, 1.0, 3.0])
     with torch.no_grad():
         head.net[-1].weight.zero_()

@@ -9,10 +9,10 @@ import pytest
 import torch
 from painted_ball import heights, photos, sky, with_textures
 from splitnerf.data.asset import Asset
-from splitnerf.refinement.fit import FitSettings, Refinement
+from splitnerf.refinement.fit import FitSettings, Refinement, is_worse
 from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
-from splitnerf.refinement.stage import PATIENCE, Candidate, Stage
+from splitnerf.refinement.stage import PATIENCE, Stage
 from splitnerf.refinement.texels import AssetTexels
 
 SETTINGS = FitSettings(sweeps=3, pixels=128, directions=4, outline=False)
@@ -114,11 +114,10 @@ def begun(painted, sweeps: int) -> Stage:
 
 def test_what_is_worse_by_chance_is_not_worse():
     """A paired test: noise that two candidates share does not count, a few batches of their own do not decide."""
-    shared = np.random.default_rng(0).normal(5.0, 2.0, 16)
-    one = Candidate(1, list(shared), None, None)
-    assert Candidate(2, list(shared + 0.1 + 0.05 * np.arange(16) % 0.1), None, None).is_worse(one)
-    assert not Candidate(2, list(shared + np.where(np.arange(16) == 3, 1.6, 0.0)), None, None).is_worse(one)
-    assert not Candidate(2, list(shared - 1.0), None, None).is_worse(one) and not one.is_worse(one)
+    one = np.random.default_rng(0).normal(5.0, 2.0, 16)
+    assert is_worse(one + 0.1 + 0.05 * np.arange(16) % 0.1, one)
+    assert not is_worse(one + np.where(np.arange(16) == 3, 1.6, 0.0), one)
+    assert not is_worse(one - 1.0, one) and not is_worse(one, one)
 
 
 @pytest.mark.parametrize("good", [0, 2])

@@ -124,8 +124,7 @@ def test_a_lobe_as_wide_as_the_sphere_is_rough():
     for roughness in (0.1, 0.5, 1.0):
         solid_angle = 4 * math.pi * roughness**4
         assert lobe_roughness(solid_angle) == pytest.approx(roughness)
-        assert lobe_roughness(torch.tensor([solid_angle])).item() == pytest.approx(roughness)
-    assert lobe_roughness(50.0) == 1.0 == lobe_roughness(torch.tensor([50.0])).item()
+    assert lobe_roughness(50.0) == 1.0
 
 
 @pytest.mark.parametrize(

@@ -218,13 +218,12 @@ def texel_roughness(solid_angles: Tensor) -> Tensor:
     return torch.full_like(solid_angles[:, None], lobe_roughness(4.0 * math.pi / len(solid_angles)))
 
 
-def lobe_roughness(solid_angle: Tensor | float) -> Tensor | float:
+def lobe_roughness(solid_angle: float) -> float:
     """The roughness, at most 1, whose pre-integration lobe has this effective solid angle (sr).
 
     A narrow lobe with ggx_alpha = a has the solid angle 4 pi a^2.
     """
-    roughness = (solid_angle / (4.0 * math.pi)) ** 0.25
-    return roughness.clamp(max=1.0) if isinstance(roughness, Tensor) else min(roughness, 1.0)
+    return min((solid_angle / (4.0 * math.pi)) ** 0.25, 1.0)
 
 
 class LightMlp(Light):
@@ -298,10 +297,8 @@ class PyramidFilters(NamedTuple):
 
     def to(self, device: torch.device) -> PyramidFilters:
         """A copy on a device; resolutions and nodes stay on the CPU, as the lookup requires."""
-        sparse = (matrix.to(device) for matrix in self[:3])
-        return PyramidFilters(
-            *sparse, self.projection.to(device), self.projected, self.resolutions, self.nodes, self.zonal.to(device)
-        )
+        moved = ("sum_of_levels", "averages", "lobes", "projection", "zonal")
+        return self._replace(**{name: getattr(self, name).to(device) for name in moved})
 
 
 @functools.lru_cache(maxsize=4)

@@ -171,14 +171,7 @@ class MaterialHead(nn.Module):
     Source: SplitNeRF's material network; width and depth from its supplement.
     """
 
-    def __init__(
-        self,
-        n_inputs: int,
-        width: int = 256,
-        n_layers: int = 2,
-        initial_roughness: float = 0.5,
-        min_roughness: float = 0.0,
-    ):
+    def __init__(self, n_inputs: int, width: int, n_layers: int, initial_roughness: float, min_roughness: float):
         super().__init__()
         self.net = relu_mlp(n_inputs, width, n_layers, 5)
         self.min_roughness = min_roughness
