@@ -70,14 +70,10 @@ def grey_photos(photos: Dataset, device: torch.device | str = "cpu", edge: int =
     return GreyPhotos(rgba[..., :3].mean(-1) * rgba[..., 3], rgba[..., 3] > 0.5, poses, lenses / factor)
 
 
-def angles_between(poses: Tensor) -> Tensor:
-    """[n, n] degrees between cameras, seen from the origin."""
+def _neighbours(poses: Tensor, i: int) -> list[int]:
+    """The photos to compare with photo i, by the angles between their cameras, seen from the origin."""
     directions = F.normalize(poses[:, :3, 3], dim=1)
-    return torch.rad2deg(torch.acos((directions @ directions.T).clamp(-1, 1)))
-
-
-def _neighbours(angles: Tensor) -> list[int]:
-    """The photos to compare with one, by the angles [n] between it and each."""
+    angles = torch.rad2deg(torch.acos((directions @ directions.T)[i].clamp(-1, 1)))
     apart = (angles - ANGLES[1]).abs() + torch.where(angles < ANGLES[0], 360.0, 0.0)
     return [j for j in apart.argsort()[:NEIGHBOURS].tolist() if ANGLES[0] <= angles[j] < ANGLES[2]]
 
@@ -142,7 +138,7 @@ def _swept(
     is 0 where there is nothing to compare. A photo counts as unlike where its own surface, of depths `base` [n, h, w],
     hides the middle of the span."""
     grey, (rays_o, rays_d) = photos.grey[i], rays
-    (height, width), near = grey.shape, _neighbours(angles_between(photos.poses)[i])
+    (height, width), near = grey.shape, _neighbours(photos.poses, i)
     depths, scores, margins = torch.zeros_like(grey), torch.full_like(grey, -1.0), torch.zeros_like(grey)
     inside = photos.masks[i] & (span > 0)
     if not near or not inside.any():
