@@ -307,11 +307,6 @@ class Batch(NamedTuple):
     phase: Tensor
     probes: ProbePoints
 
-    @property
-    def rays(self) -> tuple[Tensor, Tensor, Tensor]:
-        """Origins, directions and jitter."""
-        return self.rays_o, self.rays_d, self.jitter
-
 
 def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tensor) -> Batch:
     """Rays through ``n_rays`` random pixels, drawn by the source's generator; `exposures` [views, 3] are the photos'.

@@ -236,7 +236,8 @@ class Step:
         if self.is_held(progress):
             drawn = self.start.drawn(POINTS, self.generator)
             probes = probes._replace(anywhere=torch.cat([probes.anywhere, drawn]))
-        return find_samples(self.model, self.grid.cells, *batch.rays, anneal, probes, capacity, batch.phase, self.s)
+        rays = batch.rays_o, batch.rays_d, batch.jitter
+        return find_samples(self.model, self.grid.cells, *rays, anneal, probes, capacity, batch.phase, self.s)
 
     def differentiate(
         self,
