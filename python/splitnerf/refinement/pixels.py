@@ -78,7 +78,8 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int) 
         count += np.count_nonzero(mask)
     share, random, size = min(1.0, most / max(count, 1)), np.random.default_rng(0), dataset.height * dataset.width
     white = linear_to_srgb((1 / per_channel(dataset.exposures)).astype(np.float32))
-    parts = []
+    shapes, kinds = ((0,), (0, 2), (0, 3), (0, 3), (0, 3)), (np.int64, np.float32, np.float32, np.float32, bool)
+    parts = [tuple(map(np.zeros, shapes, kinds))]  # where no pixel is chosen
     for i, bits in enumerate(chosen):
         numbers = np.flatnonzero(np.unpackbits(bits, count=size))
         numbers = numbers[random.random(len(numbers)) < share] if share < 1 else numbers
@@ -95,12 +96,7 @@ def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int) 
                 colours >= SATURATED * white[i],
             )
         )
-    shapes = ((0,), (0, 2), (0, 3), (0, 3), (0, 3))
-    kinds = (np.int64, np.float32, np.float32, np.float32, bool)
-    arrays = [
-        np.concatenate([np.zeros(shape, kind), *(part[k] for part in parts)], dtype=kind)
-        for k, (shape, kind) in enumerate(zip(shapes, kinds))
-    ]
+    arrays = (np.concatenate(of_parts) for of_parts in zip(*parts))
     return Pixels(*arrays, dataset.world_poses[:, :3].astype(np.float32), dataset.intrinsics)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 import hashlib
-import math
 import time
 from pathlib import Path
 
@@ -33,13 +32,12 @@ TRAINED = "trained"  # the folder in a run of what training alone exported
 STATE, STATE_FORMAT = "refinement.pt", 7
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
-LEAST_HEIGHT, LARGEST_HEIGHT = 8, 256  # rows of the light that is fitted
+HEIGHTS = 256, 128, 64, 32, 16, 8  # rows that the light may have while it is fitted
 
 
 def fitting_height(height: int) -> int:
-    """The largest 8 2^k that divides a map's number of rows and is at most LARGEST_HEIGHT; 0 where there is none."""
-    sizes = [LEAST_HEIGHT << k for k in range(int(math.log2(LARGEST_HEIGHT // LEAST_HEIGHT)) + 1)]
-    return max((size for size in sizes if height % size == 0), default=0)
+    """The largest of HEIGHTS that divides a map's number of rows; 0 where none does."""
+    return next((size for size in HEIGHTS if height % size == 0), 0)
 
 
 def read_light(folder: Path) -> np.ndarray:
@@ -80,11 +78,10 @@ class StateFile:
     Args:
         folder: The folder of the results.
         origin: The hash that identifies the refinement, see :func:`origin_of`.
-        minutes: The time between two saves.
     """
 
-    def __init__(self, folder: Path, origin: str, minutes: float):
-        self.path, self.origin, self.minutes = folder / STATE, origin, minutes
+    def __init__(self, folder: Path, origin: str):
+        self.path, self.origin = folder / STATE, origin
         self.saved_at = time.monotonic()
         self.content: dict[str, object] = {}
 
@@ -113,11 +110,6 @@ class StateFile:
         """Writes the state that was taken last. Raises OSError where the disk is full; the old file is kept."""
         write_tensors(self.path, {"format": STATE_FORMAT, "origin": self.origin, **self.content})
         self.saved_at = time.monotonic()
-
-    def save_if_due(self) -> None:
-        """Writes the state where the last one is old enough."""
-        if time.monotonic() - self.saved_at > 60.0 * self.minutes:
-            self.save()
 
 
 def origin_of(source: Path, dataset: Dataset, settings: FitSettings) -> str:
@@ -152,7 +144,7 @@ def refine_folder(
     """
     asset, light = read_source(source)
     out.mkdir(parents=True, exist_ok=True)
-    kept = StateFile(out, origin_of(source, dataset, settings), save_minutes)
+    kept = StateFile(out, origin_of(source, dataset, settings))
     state = kept.load() if resume else None
     with Progress(0.0, leave=False, at_once=True) as bar:
         try:
@@ -174,7 +166,8 @@ def refine_folder(
                 complete = len(stage.sweeps) > n_sweeps
                 if complete:
                     kept.take(stage)
-                    kept.save_if_due()
+                    if time.monotonic() - kept.saved_at > 60.0 * save_minutes:
+                        kept.save()
                     bar.show(stage.progress, stage.message(len(stage.sweeps)))
         kept.save()  # also where all is done: what follows may be interrupted, too
         if not complete or not stage.finished:
