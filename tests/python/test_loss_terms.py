@@ -35,7 +35,7 @@ def rendered():
     whole = torch.zeros(n, dtype=torch.bool)
     batch = Batch(origins, directions, target, *photo, background, whole, jitter, jitter, probes)
     light = model.evaluate_light()
-    ray = render_rays(model, light, find_samples(model, grid.cells, *batch.rays, probes=batch.probes))
+    ray = render_rays(model, light, find_samples(model, grid.cells, *batch[:2], batch.jitter, probes=batch.probes))
     return config, batch, ray, loss_terms(model, light, batch, ray, None, None, g, 0, 0.0)
 
 

@@ -147,7 +147,6 @@ def test_rays_and_pixels_are_those_of_the_source():
     batch = drawn()
     for found, columns, value in ((batch.rays_o, 3, 1.0), (batch.rays_d, 3, 2.0), (batch.target, 4, 3.0)):
         assert torch.equal(found, torch.full((2000, columns), value))
-    assert batch.rays == (batch.rays_o, batch.rays_d, batch.jitter)
     assert torch.equal(batch.exposure, (batch.view + 1.0)[:, None].expand(2000, 3))
 
 
