@@ -326,7 +326,7 @@ def composite(
     return lib.composite(weights, values, offsets, opacity, least_opacity)
 
 
-def fake_packed(rays_o: Tensor, n: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def _fake_packed(rays_o: Tensor, n: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """:class:`PackedSamples` of n samples without their values, for the fake implementations."""
     offsets = rays_o.new_empty(rays_o.shape[0] + 1, dtype=torch.int64)
     return offsets.new_empty(n), rays_o.new_empty(n), rays_o.new_empty(n), offsets
@@ -371,7 +371,7 @@ def _fake_surface(sdf, gradient, rays_d, s, offsets, step, anneal, min_transmitt
     return gradient.new_empty(n, 3), sdf.new_empty(n), sdf.new_empty(rays_d.shape[0])
 
 
-register("march_rays", fake=lambda rays_o, *rest: fake_packed(rays_o, torch.library.get_ctx().new_dynamic_size()))
+register("march_rays", fake=lambda rays_o, *rest: _fake_packed(rays_o, torch.library.get_ctx().new_dynamic_size()))
 register("surface_weights", fake=_fake_surface, setup_context=_keep_surface, backward=_surface_backward)
 register(
     "surface_weights_backward",

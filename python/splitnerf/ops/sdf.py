@@ -20,7 +20,7 @@ from torch.optim.optimizer import register_optimizer_step_post_hook
 
 from splitnerf import _core
 from splitnerf.ops._library import front, lib, refuse_gradients, register
-from splitnerf.ops.rays import PackedSamples, fake_packed
+from splitnerf.ops.rays import PackedSamples, _fake_packed
 
 
 @dataclass(frozen=True)
@@ -395,7 +395,7 @@ def sample_rays(
 def _fake_sample(rays_o, rays_d, jitter, cells, table, *rest):
     n = rest[-1] or torch.library.get_ctx().new_dynamic_size()
     evaluated = rays_o.new_empty(rays_o.shape[0], dtype=torch.int64)
-    return *fake_packed(rays_o, n), evaluated, evaluated.new_empty(())
+    return *_fake_packed(rays_o, n), evaluated, evaluated.new_empty(())
 
 
 def _keep_field(ctx, inputs, output):
