@@ -152,14 +152,6 @@ def refuse_others(result: Path, words: bytes, *beside: Path, option: str = "--ou
             raise InputError(f"{path}: is not an earlier result, and would be replaced; give another {option}")
 
 
-def is_file(path: Path) -> bool:
-    """Whether a file exists at the path; false for impossible names, such as names that are too long."""
-    try:
-        return path.is_file()
-    except OSError:
-        return False
-
-
 def reason(error: OSError) -> str:
     """The message of a system error, without its number."""
     return error.strerror or str(error)

@@ -24,7 +24,7 @@ from PIL.PngImagePlugin import PngInfo
 from splitnerf import ops
 from splitnerf.data.colours import from_primaries, to_srgb
 from splitnerf.errors import InputError, note_once
-from splitnerf.files import atomic_path, is_file
+from splitnerf.files import atomic_path
 
 warnings.filterwarnings("ignore", module=r"PIL\.")  # of Pillow; damage is told of by the program
 oiio.attribute("exr_threads", -1)  # no threads of its own, for which a fork of this program would wait for ever
@@ -316,7 +316,7 @@ def _radiance_head(path: Path, name: str) -> tuple[float, tuple[int, int]]:
 @contextmanager
 def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
     """An image file with its header read, whose size is no more than its bytes and the memory allow."""
-    if not is_file(path):
+    if not os.path.isfile(path):
         raise InputError(f"{name}: no such image; check the path")
     try:
         str(path).encode()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import os
 import struct
 from pathlib import Path
 from urllib.parse import unquote
@@ -12,7 +13,6 @@ from urllib.parse import unquote
 import numpy as np
 
 from splitnerf.errors import InputError
-from splitnerf.files import is_file
 from splitnerf.memory import memory_bytes
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -158,7 +158,7 @@ class Document:
         path = self.path.parent / unquote(uri)
         if folder not in path.resolve().parents:
             raise InputError(f"{self.path}: refers to {uri[:200]!r}, outside its folder; put the file there")
-        if not is_file(path):
+        if not os.path.isfile(path):  # false for names that are too long, too
             raise InputError(f"{path}: no such file, though {self.path.name} refers to it; add it or export a GLB")
         if uri not in self._files:
             self._files[uri] = path.read_bytes()

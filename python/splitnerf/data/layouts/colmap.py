@@ -24,7 +24,6 @@ from scipy.spatial.transform import Rotation
 from splitnerf.data.layouts.frame import OPENCV_AXES, Frame, checked_pose, forms, listed_image
 from splitnerf.data.lens import MODELS, PARAMETERS, read_lens
 from splitnerf.errors import InputError, note_once
-from splitnerf.files import is_file
 
 PLACES = ("sparse", "colmap/sparse")
 IMAGES, MASKS = "images", "masks"
@@ -62,7 +61,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
         pose = checked_pose(_camera_to_world(motion), f"{source}: the pose of {name!r}")
         masks = [root / MASKS / form for given in (name, _inside(image, root)) for form in forms(given)]
         candidates = (path for mask in masks for path in (mask.with_name(f"{mask.name}.png"), mask.with_suffix(".png")))
-        mask = next((path for path in candidates if is_file(path) and not path.samefile(image)), None)
+        mask = next((path for path in candidates if os.path.isfile(path) and not path.samefile(image)), None)
         frames.append(Frame(os.path.splitext(name)[0], image, pose, *lenses[camera], mask))
     if not frames:
         raise InputError(f"{source}: has no registered image; give another model")
@@ -93,7 +92,7 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
         for folder in () if found else (root / place, *numbered):
             for ending in ("txt", "bin"):  # binary files have all digits
                 files = folder / f"cameras.{ending}", folder / f"images.{ending}"
-                if all(map(is_file, files)):
+                if all(map(os.path.isfile, files)):
                     if folder in found:
                         note_once(f"{folder}: has a model as text and as binary files; the binary ones are read")
                     found[folder] = files

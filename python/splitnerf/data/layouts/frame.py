@@ -13,7 +13,6 @@ import numpy as np
 from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES, read_header
 from splitnerf.data.lens import Distortion
 from splitnerf.errors import InputError, note_once
-from splitnerf.files import is_file
 
 RIGID_TOLERANCE = 1e-3
 ROUNDED = 5e-3  # largest entry of R^T R - 1 of a rotation R whose entries have three decimals
@@ -82,7 +81,7 @@ def checked_pose(matrix: object, name: str) -> np.ndarray:
 def listed_file(folder: Path, name: str, source: Path) -> Path:
     """The path of a file that `source` lists relative to `folder`, in Windows' form or another Unicode form perhaps; notes once
     where it leads out of the folder."""
-    path = next((folder / form for form in forms(name) if is_file(folder / form)), folder / name)
+    path = next((folder / form for form in forms(name) if os.path.isfile(folder / form)), folder / name)
     if not os.path.abspath(path).startswith(os.path.join(os.path.abspath(folder), "")):
         note_once(f"{source}: names files outside of its folder; they are read", f"{name!r} is one")
     return path
@@ -95,9 +94,7 @@ def listed_image(folder: Path, name: str, source: Path, others: Sequence[Path | 
     suffixes = [form for suffix in LDR_SUFFIXES + HDR_SUFFIXES for form in (suffix, suffix.upper())]
     longer = [] if own.lower() in suffixes else [name + suffix for suffix in suffixes]
     candidates = (name, *longer, stem + own.lower(), stem + own.upper())
-    found = [
-        (candidate, path) for candidate in candidates for form in forms(candidate) if is_file(path := folder / form)
-    ]
+    found = [(given, path) for given in candidates for form in forms(given) if os.path.isfile(path := folder / form)]
     found.sort(key=lambda pair: pair[0] != name and pair[1] in others)
     if found and (found[0][0] == name or found[0][1] not in others or read_header(found[0][1]).channels in (2, 4)):
         return listed_file(folder, found[0][0], source)

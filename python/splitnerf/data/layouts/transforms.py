@@ -34,7 +34,6 @@ from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, l
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
 from splitnerf.errors import InputError, note_once, shown
-from splitnerf.files import is_file
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
@@ -224,7 +223,7 @@ def read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
         distortion,
         mask_path,
         mask_kind,
-        dynamic_mask_path=dynamic if is_file(dynamic) else None,
+        dynamic_mask_path=dynamic if os.path.isfile(dynamic) else None,
         behind_path=behind_path,
         exposure=_read_exposure(entry, index, path),
         gamma=_read_gamma(entry.get("gamma", meta.get("gamma", 0.0)), path),
