@@ -268,12 +268,13 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
         write_report(run, model, evaluated, timings)
 
 
-def load_run(run: Path) -> tuple[SceneModel, OccupancyGrid, dict]:
-    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself. Raises InputError where
-    there is no run, or its checkpoint cannot be read."""
+def load_run(run: Path, sizes: dict[str, object] | None = None) -> tuple[SceneModel, OccupancyGrid, dict]:
+    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself; `sizes` are settings
+    `export.*` by name, None for those of the run. Raises InputError where there is no run, or its checkpoint cannot be
+    read."""
     refuse_no_run(run)
     content = load_checkpoint(run / "checkpoint.pt")
-    config = config_of(content)
+    config = config_of(content).replace(sizes or {})
     model = SceneModel(config)
     restore_model(model, content, run / "checkpoint.pt")
     model.open_levels(progress_by(config)(content["step"], content["seconds"]))
@@ -311,18 +312,11 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
 
 
 def export_run(
-    run: Path,
-    out: Path,
-    *,
-    formats: Sequence[str],
-    n_faces: int | None = None,
-    texture_size: int | None = None,
-    resolution: int | None = None,
-    placing: Placing = Placing(),
-    overwrite: bool = False,
+    run: Path, out: Path, *, formats: Sequence[str], sizes: dict[str, object], placing: Placing, overwrite: bool
 ) -> Exported:
     """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`: what the run delivers;
-    with a size, or into the run, what was trained. origin.json says where an asset is that is not as the data have it.
+    with other `sizes`, settings `export.*` by name, or into the run, what was trained. origin.json says where an asset is
+    that is not as the data have it.
 
     Raises:
         InputError: The run cannot be used, files would be replaced (unless ``overwrite``), or a format needs a package
@@ -339,15 +333,14 @@ def export_run(
         raise InputError(
             f"{out}: the run's own asset stands where the data are; for --pivot, --scale and --height give another --out"
         )
-    anew = any(size is not None for size in (n_faces, texture_size, resolution))
     refined = is_refined(run) and not own
-    if refined and anew:
+    if refined and sizes:
         note(
             f"another size is of what was trained, without the refinement; `splitnerf refine {out}` fits it to the photos"
         )
-    asset = read_asset(run / "mesh.glb") if refined and not anew else None
+    asset = read_asset(run / "mesh.glb") if refined and not sizes else None
     if asset is None:
-        model, _, content = load_run(run)
+        model, _, content = load_run(run, sizes)
     with locked(out):
         if asset is not None:
             asset.name = asset_name(run)
@@ -359,9 +352,6 @@ def export_run(
                 content["box_from_world"].numpy(),
                 Cameras(**content["cameras"]),
                 formats=formats,
-                resolution=resolution,
-                n_faces=n_faces,
-                texture_size=texture_size,
                 name=asset_name(run),
                 placing=placing,
             )

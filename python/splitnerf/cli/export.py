@@ -61,10 +61,12 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--formats: unknown {unknown[0]!r}; there are {', '.join(FORMATS)}")
     if args.faces is not None and args.faces != 0 and args.faces < MIN_FACES:
         raise InputError(f"--faces must be 0 or at least {MIN_FACES}, got {args.faces}")
-    for option in ("texture_size", "resolution"):
+    sizes = {}
+    for option in ("faces", "texture_size", "resolution"):
         value, limits = getattr(args, option), FIELDS[f"export.{option}"].metadata["limits"]
         if value is not None and not limits.allow(value):
             raise InputError(f"--{option.replace('_', '-')} must be {limits}, got {value}")
+        sizes |= {} if value is None else {f"export.{option}": value}
     for option in ("scale", "height"):
         value = getattr(args, option)
         if value is not None and not 1e-6 <= value <= 1e6:
@@ -76,9 +78,7 @@ def run(args: argparse.Namespace) -> int:
         args.run,
         out,
         formats=formats,
-        n_faces=args.faces,
-        texture_size=args.texture_size,
-        resolution=args.resolution,
+        sizes=sizes,
         placing=Placing(args.pivot == "foot", args.scale, args.height),
         overwrite=args.overwrite,
     )

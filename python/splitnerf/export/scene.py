@@ -112,22 +112,19 @@ def write_assets(
     cameras: Cameras,
     *,
     formats: Sequence[str] = ("glb", "ply"),
-    resolution: int | None = None,
-    n_faces: int | None = None,
-    texture_size: int | None = None,
     name: str = "object",
     placing: Placing = Placing(),
 ) -> Exported:
     """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder.
 
-    All files are in the data's own world frame, or as `placing` says; the light does not change. GLB, OBJ and USDZ are
-    decimated, textured and y up. The PLY holds the extracted mesh with vertex colours. What none of the photos'
-    cameras sees is a cap between its edges.
+    The sizes of grid, mesh and textures are those of the model's settings, group `export`. All files are in the data's
+    own world frame, or as `placing` says; the light does not change. GLB, OBJ and USDZ are decimated, textured and y
+    up. The PLY holds the extracted mesh with vertex colours. What none of the photos' cameras sees is a cap between its
+    edges.
 
     Args:
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
         formats: Out of :data:`FORMATS`.
-        resolution, n_faces, texture_size: The sizes of grid, mesh and textures; None for those of the group `export`.
         name: What the mesh, its material and its images are called.
         placing: Where the files have the asset.
 
@@ -137,8 +134,7 @@ def write_assets(
         RuntimeError: A field is not finite.
     """
     c = model.config
-    resolution = c.export.resolution if resolution is None else resolution
-    n_faces = c.export.faces if n_faces is None else n_faces
+    resolution = c.export.resolution
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)
@@ -157,8 +153,8 @@ def write_assets(
                 vertices,
                 faces,
                 surface,
-                n_faces=n_faces,
-                texture_size=texture_size or c.export.texture_size,
+                n_faces=c.export.faces,
+                texture_size=c.export.texture_size,
                 spacing=spacing,
                 occlusion_offset=c.constants.occlusion_offset,
                 on_surface=on_surface,
