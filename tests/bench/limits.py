@@ -30,7 +30,7 @@ from splitnerf.evaluate.scoring import (
     choose_views,
     environment_beside,
     relight,
-    relit_scores,
+    relight_scores,
 )
 from splitnerf.relight.rendering import asset_of
 from splitnerf.render.path_traced import AssetRenderer
@@ -120,7 +120,8 @@ class Scene:
     def scores(self, asset: Asset) -> dict[str, float | None]:
         """The columns of the table, None where the data have no truth."""
         renderer = AssetRenderer(asset)
-        relit, relit_part = relit_scores(renderer, self.views, self.maps, self.spp)
+        relit = relight(renderer, self.views, self.maps, self.spp)
+        relit_part = relit and relight_scores(relit)
         again = relit and relight(Reseeded(renderer), self.views, self.maps, max(1, self.spp // 2))
         seen = {
             name: asset_predictions(renderer, self.views, light, self.spp)

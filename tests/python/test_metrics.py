@@ -40,8 +40,8 @@ def test_scales():
     x = np.array([[1.0, 0], [2, 0], [3, 0]])
     y = np.array([[2.0, 1], [4, 1], [9, 1]])
     # sum xy / sum xx = (2 + 8 + 27) / 14; a black channel keeps 1.
-    assert metrics.lsq_scale(x, y) == pytest.approx([37 / 14, 1])
-    assert metrics.lsq_scale(x, y, np.array([1.0, 0, 0])) == pytest.approx([2, 1])
+    assert metrics.lsq_scale(metrics.lsq_sums(x, y)) == pytest.approx([37 / 14, 1])
+    assert metrics.lsq_scale(metrics.lsq_sums(x, y, np.array([1.0, 0, 0]))) == pytest.approx([2, 1])
 
 
 def test_normal_error():

@@ -43,34 +43,26 @@ def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
     return float((luminance * structure).mean())
 
 
-def lsq_scale(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """The factor per channel [C] float64 that brings a linear prediction [m, C] nearest to the truth: sum w x y / sum w
-    x^2, with weights [m], 1 by default; 1 for a channel that is 0 everywhere."""
-    return scale_of_sums(lsq_sums(prediction, truth, weights))
-
-
 def lsq_sums(prediction: np.ndarray, truth: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """The sums [2, C] float64 (sum w x y, sum w x^2) of some pixels for `lsq_scale`; sums of parts can be added."""
+    """The sums [2, C] float64 (sum w x y, sum w x^2) of linear pixels [m, C] with weights [m], 1 by default, for
+    `lsq_scale`; sums of parts can be added."""
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     w = np.ones(len(x)) if weights is None else weights
     return np.stack([(w[:, None] * x * y).sum(axis=0), (w[:, None] * x * x).sum(axis=0)])
 
 
-def scale_of_sums(sums: np.ndarray) -> np.ndarray:
-    """The scale [C] of `lsq_sums`."""
+def lsq_scale(sums: np.ndarray) -> np.ndarray:
+    """The factor per channel [C] float64 that brings a prediction nearest to the truth, sum w x y / sum w x^2 of
+    `lsq_sums`; 1 for a channel that is 0 everywhere."""
     product, square = sums
     return np.where(square > 0, product / np.where(square > 0, square, 1), 1.0)
 
 
-def angles_deg(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """[...] angles in degrees between unit vectors [..., 3], stable near 0 and 180: 2 atan2(|a - b|, |a + b|)."""
-    a, b = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
-    return np.degrees(2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)))
-
-
 def normal_mae_deg(prediction: np.ndarray, truth: np.ndarray) -> float:
-    """Mean angle in degrees between unit normals [m, 3]."""
-    return float(angles_deg(prediction, truth).mean())
+    """Mean angle in degrees between unit normals [m, 3]: 2 atan2(|a - b|, |a + b|), stable near 0 and 180."""
+    a, b = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
+    angles = 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return float(np.degrees(angles).mean())
 
 
 def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray) -> float:
@@ -88,7 +80,7 @@ def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
     x, y = (resize_environment(image, *LIGHT_SIZE).reshape(-1, 3).astype(np.float64) for image in (light, truth))
     weights = directions_of_texels(LIGHT_SIZE[0])[1].ravel()
     white = max(np.percentile(y, 99), 1e-8)
-    x, y = (np.clip(image / white, 0, 1) for image in (x * lsq_scale(x, y, weights), y))
+    x, y = (np.clip(image / white, 0, 1) for image in (x * lsq_scale(lsq_sums(x, y, weights)), y))
     mse = np.average(((x - y) ** 2).mean(axis=1), weights=weights)
     return float(-10 * np.log10(max(mse, MSE_FLOOR)))
 

@@ -178,4 +178,4 @@ def _scales(views: Iterable[ScaledView]) -> dict[str, np.ndarray]:
     for view in views:
         mask = (view.alpha > OPAQUE) & (view.truth_alpha > OPAQUE)
         sums += metrics.lsq_sums(view.prediction[mask], view.truth[mask])
-    return {"raw": np.ones(3), "lsq": metrics.scale_of_sums(sums)}
+    return {"raw": np.ones(3), "lsq": metrics.lsq_scale(sums)}

@@ -113,9 +113,11 @@ def render_view(
     )
 
 
-def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], spp: int) -> RelitViews:
+def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], spp: int) -> RelitViews | None:
     """Renders all views under all environment maps, of each of which the data must hold the truth, with `spp` paths a
-    pixel. Raises InputError where a map cannot be used, or the truth of a view is missing or unreadable."""
+    pixel; None where there is no map. Raises InputError where a map cannot be used, or the truth of a view is missing or unreadable."""
+    if not maps:
+        return None
     for name in maps:
         for index in range(len(dataset)):
             read_relit(dataset, index, name)
@@ -155,16 +157,6 @@ def choose_views(dataset: Dataset, protocol: Protocol) -> tuple[Dataset, dict[st
         found = f"{dataset.root}: has {len(dataset)} {dataset.split} views"
         raise InputError(f"{found}, {count} were requested; change --views")
     return dataset.select(spread(range(len(dataset)), count)), maps
-
-
-def relit_scores(
-    renderer: AssetRenderer, views: Dataset, maps: dict[str, Path], spp: int
-) -> tuple[RelitViews | None, dict | None]:
-    """Renders and scores the relit views; None and None where there is no map."""
-    if not maps:
-        return None, None
-    relit = relight(renderer, views, maps, spp)
-    return relit, relight_scores(relit, find_distance()[0])
 
 
 def asset_mesh(asset: Asset) -> trimesh.Trimesh:
@@ -207,7 +199,7 @@ def score_asset(
     """
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
-    relit = relit_scores(renderer, views, maps, spp)
+    relit = relight(renderer, views, maps, spp)
     evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "asset", "spp": spp})
 
@@ -227,7 +219,7 @@ def score_fields(
     data's world frame (None: that of the asset), and what was exported, which the relit views show, or None."""
     predictions = [render_maps(model, grid, views, i) for i in tracked(range(len(views)), "evaluation, view")]
     light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
-    relit = (None, None) if asset is None else relit_scores(AssetRenderer(asset), views, maps, spp)
+    relit = None if asset is None else relight(AssetRenderer(asset), views, maps, spp)
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
     evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure)
     return replace(evaluated, scores=evaluated.scores | {"scored": "fields"})
@@ -238,28 +230,20 @@ def _scored(
     views: Dataset,
     light: np.ndarray | None,
     mesh: trimesh.Trimesh | None,
-    relit: tuple[RelitViews | None, dict | None],
+    relit: RelitViews | None,
     seconds: float | None,
     free_exposure: bool,
 ) -> Evaluated:
-    """Scores rendered views, a light and a mesh against the truth of the data; relit views bring their scores."""
+    """Scores rendered views, a light and a mesh against the truth of the data, and relit views."""
     if free_exposure and light is not None:
         views = exposed_like(views, predictions)
-    truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
+    truths, truth, distance = load_view_truths(views), load_scene_truth(views.root, views.origin), find_distance()[0]
+    relit_scores = None if relit is None else relight_scores(relit, distance)
     scores = evaluate_maps(
-        predictions,
-        views,
-        truths,
-        light,
-        truth.light,
-        mesh,
-        truth.mesh,
-        seconds,
-        relight=relit[1],
-        distance=find_distance()[0],
+        predictions, views, truths, light, truth.light, mesh, truth.mesh, seconds, relit_scores, distance
     )
     scores |= {"exposures": "fitted"} if free_exposure else {}
-    return Evaluated(scores, views, predictions, truths, relit[0])
+    return Evaluated(scores, views, predictions, truths, relit)
 
 
 def asset_predictions(
