@@ -7,7 +7,7 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from splitnerf.data.images import encode_png
+from splitnerf.data.images import encode_image
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -41,7 +41,8 @@ class Gltf:
 
     def texture(self, pixels) -> int:
         """Index of a texture, [h, w, c] in [0, 1], stored as PNG."""
-        self.json["images"].append({"mimeType": "image/png", "bufferView": self.view(encode_png(np.asarray(pixels)))})
+        view = self.view(encode_image(np.asarray(pixels), ".png"))
+        self.json["images"].append({"mimeType": "image/png", "bufferView": view})
         self.json["textures"].append({"source": len(self.json["images"]) - 1})
         return len(self.json["textures"]) - 1
 

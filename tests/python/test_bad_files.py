@@ -24,7 +24,7 @@ from layout_scenes import (
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
-from splitnerf.data.images import encode_png, read_image, write_image
+from splitnerf.data.images import encode_image, read_image, write_image
 from splitnerf.data.truth import load_view_truths, read_mesh
 from splitnerf.errors import InputError
 from splitnerf.pipeline import load_splits
@@ -303,6 +303,7 @@ def with_texel(value: float) -> Damage:
     return floats(pixels)
 
 
+PNG = encode_image(np.ones((4, 8, 3)), ".png")
 MAPS = {
     "NaN": (with_texel(np.nan), "a.exr: has NaN or infinite pixels"),
     "infinite": (with_texel(np.inf), "a.exr: has NaN or infinite pixels"),
@@ -311,7 +312,7 @@ MAPS = {
     "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
     "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
     **{
-        name: (file(name, encode_png(np.ones((4, 8, 3)))), f"{name}: an environment map must hold linear radiance")
+        name: (file(name, PNG), f"{name}: an environment map must hold linear radiance")
         for name in ("a.png", "a.hdr", "a.exr")
     },
     "none": (lambda root: root / "b.hdr", "no such environment map"),

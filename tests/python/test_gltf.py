@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from gltf_builder import TRIANGLE, TRIANGLE_UV, Gltf, beside, triangle
 from splitnerf.data.gltf import document, geometry, read_asset
-from splitnerf.data.images import decode_image, encode_png, srgb_to_linear
+from splitnerf.data.images import decode_image, encode_image, srgb_to_linear
 from splitnerf.errors import InputError
 
 
@@ -264,7 +264,7 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatc
 
 
 def test_the_pixels_of_a_texture_cost_more_before_they_are_unpacked():
-    grey, asked = encode_png(np.zeros((8, 16, 1))), []
+    grey, asked = encode_image(np.zeros((8, 16, 1)), ".png"), []
     with pytest.raises(ZeroDivisionError):
         decode_image(grey[:60], "x", lambda n_values: asked.append(n_values) or 1 / 0)
     assert asked == [8 * 16 * 3]

@@ -23,6 +23,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from splitnerf import ops
 from splitnerf.data.colours import from_primaries, to_srgb
+from splitnerf.data.pixels import decoded
 from splitnerf.errors import InputError, note_once
 from splitnerf.files import atomic_path
 
@@ -47,12 +48,40 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
     EXR. Raises InputError where the file is missing, unreadable, truncated, of another format, or claims a size beyond
     reason.
     """
-    return _read(Path(path), str(path))
+    return decoded(read_codes(path))
 
 
-def read_codes(path: str | os.PathLike) -> np.ndarray:
-    """Reads an image like `read_image`, but the values of 8- and 16-bit files as they are stored: uint8 or uint16."""
-    return _read(Path(path), str(path), as_stored=True)
+def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
+    """Reads an image like `read_image`, but the values of 8- and 16-bit files as they are stored: uint8 or uint16. Messages
+    name it `name`, by default the path."""
+    path = Path(path)
+    name = name or str(path)
+    with _opened(path, name) as (source, spec):
+        kind = str(spec.format) if str(spec.format) in STORED else "float"
+        pixels = source.read_image(source.current_subimage(), 0, 0, spec.nchannels, kind)
+        if pixels is None or source.has_error:
+            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
+        pixels = np.asarray(pixels).reshape(spec.height, spec.width, -1)
+        kept = _named_channels(spec) or list(range(spec.nchannels))
+        if len(kept) < spec.nchannels:
+            others = [channel for i, channel in enumerate(spec.channelnames) if i not in kept]
+            if {"RY", "BY"} <= set(others):
+                raise InputError(f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B")
+            note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
+        top, left, height, width = _window(source, spec)
+        exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
+        primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None
+    pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
+    if primaries is not None and pixels.shape[2] >= 3:
+        pixels[..., :3] = from_primaries(pixels[..., :3], primaries, path)
+    pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
+    pixels = pixels[:: order[0], :: order[1]]
+    if (top, left, height, width) != (0, 0, *pixels.shape[:2]):
+        whole = np.zeros((height, width, pixels.shape[2]), pixels.dtype)
+        part = pixels[max(0, -top) :, max(0, -left) :][: max(0, height - max(0, top)), : max(0, width - max(0, left))]
+        whole[max(0, top) :, max(0, left) :][: part.shape[0], : part.shape[1]] = part
+        pixels = whole
+    return np.ascontiguousarray(pixels)
 
 
 def read_colours(path: str | os.PathLike) -> np.ndarray:
@@ -86,7 +115,7 @@ def read_header(path: str | os.PathLike) -> Header:
     """What an image file says of itself, without its pixels. Raises InputError as `read_image` does."""
     with _opened(Path(path), str(path)) as (source, spec):
         height, width = _window(source, spec)[2:]
-        return Header(height, width, len(_channels(spec)), STORED.get(str(spec.format), 32))
+        return Header(height, width, len(_named_channels(spec)) or spec.nchannels, STORED.get(str(spec.format), 32))
 
 
 def is_written_here(path: Path) -> bool:
@@ -106,7 +135,7 @@ def decode_image(data: bytes, name: str, spend: Callable[[int], None] = lambda n
         path.write_bytes(data)
         with _opened(path, name) as (_, spec):
             spend(spec.width * spec.height * max(3, spec.nchannels))
-        return _read(path, name)
+        return decoded(read_codes(path, name))
 
 
 def read_radiance(path: str | os.PathLike) -> np.ndarray:
@@ -137,7 +166,7 @@ def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = Fal
         temporary.write_bytes(data)
 
 
-def encode_image(pixels: np.ndarray, suffix: str, name: str, *, half: bool = False) -> bytes:
+def encode_image(pixels: np.ndarray, suffix: str, name: str = "a picture", *, half: bool = False) -> bytes:
     """The bytes of an image file; `name` stands in messages, other arguments and errors as for `write_image`."""
     suffix, pixels = suffix.lower(), np.asarray(pixels)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
@@ -150,11 +179,6 @@ def encode_image(pixels: np.ndarray, suffix: str, name: str, *, half: bool = Fal
     if suffix in LDR_SUFFIXES:
         return _encode_ldr(to_uint8(pixels), suffix)
     return _encode_hdr(np.ascontiguousarray(pixels, dtype=np.float32), suffix, name, oiio.HALF if half else oiio.FLOAT)
-
-
-def encode_png(pixels: np.ndarray) -> bytes:
-    """The bytes of a PNG file; pixels as for `write_image`."""
-    return encode_image(pixels, ".png", "a picture")
 
 
 def to_uint8(pixels: np.ndarray) -> np.ndarray:
@@ -228,42 +252,6 @@ def _encode_hdr(pixels: np.ndarray, suffix: str, name: str, kind: oiio.BASETYPE)
             raise OSError(f"{name}: writing into {folder} failed; it may be full")
         source.close()
         return path.read_bytes()
-
-
-def _read(path: Path, name: str, as_stored: bool = False) -> np.ndarray:
-    """[H, W, C], float32 or, where that is asked for and they are bytes or words, the values as they are stored."""
-    with _opened(path, name) as (source, spec):
-        kind = str(spec.format) if as_stored and str(spec.format) in STORED else "float"
-        pixels = source.read_image(source.current_subimage(), 0, 0, spec.nchannels, kind)
-        if pixels is None or source.has_error:
-            raise InputError(f"{name}: truncated or damaged image ({_reason(source)}); replace it")
-        pixels, kept = np.asarray(pixels).reshape(spec.height, spec.width, -1), _channels(spec)
-        if len(kept) < spec.nchannels:
-            others = [channel for i, channel in enumerate(spec.channelnames) if i not in kept]
-            if {"RY", "BY"} <= set(others):
-                raise InputError(
-                    f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B"
-                )
-            note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
-        top, left, height, width = _window(source, spec)
-        exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
-        primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None
-    pixels = pixels[..., kept] if kept != list(range(spec.nchannels)) else pixels
-    if primaries is not None and pixels.shape[2] >= 3:
-        pixels[..., :3] = from_primaries(pixels[..., :3], primaries, path)
-    pixels = pixels / np.float32(exposure) if exposure != 1 else pixels
-    pixels = pixels[:: order[0], :: order[1]]
-    if (top, left, height, width) != (0, 0, *pixels.shape[:2]):
-        whole = np.zeros((height, width, pixels.shape[2]), pixels.dtype)
-        part = pixels[max(0, -top) :, max(0, -left) :][: max(0, height - max(0, top)), : max(0, width - max(0, left))]
-        whole[max(0, top) :, max(0, left) :][: part.shape[0], : part.shape[1]] = part
-        pixels = whole
-    return np.ascontiguousarray(pixels)
-
-
-def _channels(spec: oiio.ImageSpec) -> list[int]:
-    """The channels that make an image, see :func:`_named_channels`; all where the names are others."""
-    return _named_channels(spec) or list(range(spec.nchannels))
 
 
 def _named_channels(spec: oiio.ImageSpec) -> list[int]:

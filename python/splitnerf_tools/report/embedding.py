@@ -16,7 +16,7 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 from PIL import Image, features
 from splitnerf.data.asset import Asset
-from splitnerf.data.images import encode_png, linear_to_srgb, to_uint8
+from splitnerf.data.images import encode_image, linear_to_srgb, to_uint8
 from splitnerf.files import atomic_path
 from splitnerf.relight.cameras import HALF_FIELD, bounding_sphere, turntable
 
@@ -93,7 +93,7 @@ def data_uri(pixels: np.ndarray) -> Markup:
     """Encodes an image [H, W, 1 | 3 | 4] as a data URI: PNG, or lossless WebP above 200 x 200 pixels, a third of its
     size."""
     if pixels.shape[0] * pixels.shape[1] <= SMALL or not features.check("webp"):
-        return _uri("png", encode_png(pixels))
+        return _uri("png", encode_image(pixels, ".png"))
     codes, file = to_uint8(pixels), io.BytesIO()
     Image.fromarray(codes[..., 0] if codes.shape[2] == 1 else codes).save(
         file, "WEBP", lossless=True, quality=WEBP_EFFORT, method=1

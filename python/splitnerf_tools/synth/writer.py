@@ -78,8 +78,8 @@ class SceneWriter:
             entry = {"file_path": f"./{split}/{image.stem}", "transform_matrix": pose.tolist()}
             entry |= {} if light_turn is None else {"light_rotation": light_turn.tolist()}
         else:
-            entry = {"cam_angle_x": self.camera_angle_x, "cam_transform_mat": view_folders.format_matrix(pose)}
-            entry |= {"imw": width, "imh": height}
+            entry = {"cam_angle_x": self.camera_angle_x, "imw": width, "imh": height}
+            entry |= {"cam_transform_mat": ",".join(map(repr, pose.ravel().tolist()))}
         self._views.setdefault(split, []).append((image, entry))
         if split == "test":
             self._write_truth(image, maps)

@@ -43,23 +43,14 @@ def read(root: Path, split: str | None) -> list[Frame]:
     return [_read_view(folder) for folder in folders]
 
 
-def parse_matrix(text: object) -> object:
-    """The 4 x 4 nested list of a comma-separated string; anything else as it came, for the caller to refuse."""
-    if not isinstance(text, str):
-        return text
-    numbers = [number.strip() for number in text.split(",")]
-    return [numbers[4 * row : 4 * row + 4] for row in range(4)] if len(numbers) == 16 else numbers
-
-
-def format_matrix(pose) -> str:
-    """The inverse of `parse_matrix`, for a [4, 4] array."""
-    return ",".join(repr(float(value)) for row in pose for value in row)
-
-
 def _read_view(folder: Path) -> Frame:
     path, image_path = folder / METADATA, folder / PHOTO
     content = read_json(path, "cam_transform_mat")
-    pose = checked_pose(parse_matrix(need(content, "cam_transform_mat", path)), f"{path}: cam_transform_mat")
+    matrix = need(content, "cam_transform_mat", path)
+    if isinstance(matrix, str):
+        words = matrix.split(",")
+        matrix = [words[start : start + 4] for start in range(0, len(words), 4)]
+    pose = checked_pose(matrix, f"{path}: cam_transform_mat")
     numbers = {"camera_angle_x": need(content, "cam_angle_x", path), "w": content.get("imw"), "h": content.get("imh")}
     if not image_path.is_file():
         raise InputError(f"{image_path}: no such image; add it or remove the folder")
