@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from splitnerf import _core
 from splitnerf.data.images import HDR_SUFFIXES, area_average, read_header, read_image, read_radiance
@@ -125,11 +126,6 @@ def resize_environment(image: np.ndarray, height: int, width: int) -> np.ndarray
 def _bilinear(image: np.ndarray, v: np.ndarray, u: np.ndarray) -> np.ndarray:
     """[..., C] float32, a map [h, w, C] between its texels, at v from the top and u [...] as shares of it; u wraps around."""
     height, width = image.shape[:2]
-    row, column = np.clip(v * height - 0.5, 0, height - 1), u * width - 0.5
-    top, left = np.clip(np.floor(row).astype(int), 0, max(0, height - 2)), np.floor(column).astype(int)
-    down, across = (row - top)[..., None], (column - left)[..., None]
-    upper, lower = (
-        (1 - across) * image[y, left % width] + across * image[y, (left + 1) % width]
-        for y in (top, np.minimum(top + 1, height - 1))
-    )
-    return ((1 - down) * upper + down * lower).astype(np.float32)
+    places = np.stack([(v * height - 0.5).clip(0, height - 1), u * width - 0.5])
+    bands = (map_coordinates(band, places, np.float32, order=1, mode="grid-wrap") for band in np.moveaxis(image, -1, 0))
+    return np.stack([*bands], axis=-1)

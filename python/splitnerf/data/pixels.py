@@ -6,7 +6,7 @@ import mmap
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from weakref import WeakValueDictionary
 
@@ -67,9 +67,6 @@ class Photos:
 
     def __len__(self) -> int:
         return len(self.codes)
-
-    def __iter__(self) -> Iterator[np.ndarray]:
-        return (self[i] for i in range(len(self)))
 
     def __getitem__(self, index: object) -> np.ndarray:
         first = index[0] if isinstance(index, tuple) else index
@@ -134,13 +131,12 @@ def new_array(shape: tuple[int, ...], dtype: np.dtype, in_file: bool) -> np.ndar
         try:
             if hasattr(os, "posix_fallocate"):  # else a disk that others fill ends the program without a word
                 os.posix_fallocate(file.fileno(), 0, size)
-            else:
-                os.truncate(file.fileno(), size)
+            array = np.memmap(file, dtype, "r+", shape=shape)
         except OSError as error:
             raise InputError(f"{folder}: cannot hold {size / GB:.1f} GB of photos ({error.strerror}); {CURE}") from None
-        mapped = mmap.mmap(file.fileno(), size)
-    mapped.madvise(mmap.MADV_RANDOM)  # pixels are drawn one by one: reading ahead would read a hundred times as much
-    return np.frombuffer(mapped, dtype).reshape(shape)
+    # Pixels are drawn one by one: reading ahead would read a hundred times as much.
+    file_of(array).madvise(mmap.MADV_RANDOM)
+    return array
 
 
 def folder_of_files() -> Path:
@@ -151,11 +147,7 @@ def folder_of_files() -> Path:
 
 def file_of(array: np.ndarray) -> mmap.mmap | None:
     """The mapped file that an array lies in, or None."""
-    base = array
-    while isinstance(base, np.ndarray):
-        base = base.base
-    base = base.obj if isinstance(base, memoryview) else base
-    return base if isinstance(base, mmap.mmap) else None
+    return getattr(array, "_mmap", None)
 
 
 def forget_pages(array: np.ndarray) -> None:

@@ -102,7 +102,9 @@ def bake(
     if not covered.any():
         raise RuntimeError(f"no texel of {size} x {size} lies in a chart; give a larger texture size")
     maps = (albedo, roughness_metallic, normal)
-    fill_in(covered.reshape(size, size), maps)
+    row, column = nearest_texels(covered.reshape(size, size)).reshape(2, -1)[:, ~covered].astype(np.int64)
+    for values in maps:
+        values[~covered] = values[row * size + column]
     albedo, roughness_metallic, normal = (values.reshape(size, size, -1) for values in maps)
     material = Material(
         mesh.name,
@@ -112,15 +114,6 @@ def bake(
         normal_texture=normal,
     )
     return material, bake_occlusion(mesh, size, offset)
-
-
-def fill_in(covered: np.ndarray, maps: tuple[np.ndarray, ...]) -> None:
-    """Gives the texels that are not covered [h, w] the value of the nearest covered one, in maps [h * w, c]."""
-    missing = np.flatnonzero(~covered)
-    row, column = nearest_texels(covered)
-    nearest = row.reshape(-1)[missing].astype(np.int64) * covered.shape[1] + column.reshape(-1)[missing]
-    for values in maps:
-        values[missing] = values[nearest]
 
 
 def nearest_texels(covered: np.ndarray) -> np.ndarray:

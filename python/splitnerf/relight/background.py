@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 
 from splitnerf.data.environment import sample_environment
 from splitnerf.data.images import over_background, read_colours, read_header, read_radiance, srgb_to_linear
@@ -52,14 +52,8 @@ def read_plate(path: Path) -> np.ndarray:
 
 def fill(plate: np.ndarray, width: int, height: int) -> np.ndarray:
     """Scales an image [h, w, 3] so that it covers width x height, and crops it about its centre."""
-    rows, columns = plate.shape[:2]
-    scale = max(width / columns, height / rows)
-    shape = (max(height, round(rows * scale)), max(width, round(columns * scale)))
-    if shape != (rows, columns):
-        size, bands = shape[::-1], np.float32(plate).transpose(2, 0, 1)
-        plate = np.stack([Image.fromarray(band).resize(size, Image.Resampling.BILINEAR) for band in bands], axis=-1)
-    top, left = (shape[0] - height) // 2, (shape[1] - width) // 2
-    return np.ascontiguousarray(plate[top : top + height, left : left + width], np.float32)
+    bands = map(Image.fromarray, np.float32(plate).transpose(2, 0, 1))
+    return np.stack([ImageOps.fit(band, (width, height), Image.Resampling.BILINEAR) for band in bands], axis=-1)
 
 
 def environment_behind(view: View, environment: np.ndarray) -> np.ndarray:
