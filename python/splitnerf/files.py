@@ -144,11 +144,11 @@ def own_folder(folder: Path, purpose: str = "") -> None:
 
 
 def refuse_others(result: Path, words: bytes, *beside: Path, option: str = "--out") -> None:
-    """Raises InputError where a result, or a file written beside it, would replace another file: one is there, and the
-    result does not have its `words` near its beginning."""
+    """Raises InputError where a result, or a file written beside it, would replace another file: one is there that is not
+    empty, and the result does not have its `words` near its beginning."""
     begin = result.open("rb").read(4096) if result.is_file() else b""
     for path in (result, *beside):
-        if os.path.lexists(path) and not (words in begin and path.is_file()):
+        if os.path.lexists(path) and not (path.is_file() and (words in begin or path.stat().st_size == 0)):
             raise InputError(f"{path}: is not an earlier result, and would be replaced; give another {option}")
 
 

@@ -329,7 +329,7 @@ def export_run(
     check_results(out, run, overwrite=overwrite)
     read_place(run)  # before anything is written
     own = own_results(out, run)
-    if own and placing.moves:
+    if own and placing != Placing():
         raise InputError(
             f"{out}: the run's own asset stands where the data are; for --pivot, --scale and --height give another --out"
         )

@@ -362,7 +362,7 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, tmp_path, mo
     normal = np.broadcast_to(TILTED, (HEIGHT, WIDTH, 3))
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[0] = True
-    truths = [ViewTruth("a", colour, grey, 2 * grey, normal, mask)] * 5
+    truths = [ViewTruth(colour, grey, 2 * grey, normal, mask)] * 5
     alpha = np.full((HEIGHT, WIDTH), 0.8, np.float32)
     prediction = {"rgb": 3 * colour, "alpha": alpha, "albedo": 2 * colour}
     prediction |= {"roughness": 3 * grey, "metallic": grey, "normal": -normal}

@@ -126,7 +126,7 @@ def make_inputs():
         mask = image[..., 3] > 0.9
         metallic = (np.arange(16) % 2 * np.ones(shape)).astype(np.float32)
         maps = {"albedo": 0.2 + 0.5 * image[..., :3], "roughness": np.full(shape, 0.5), "metallic": metallic}
-        truths.append(ViewTruth("r", **maps, normal=normals, normal_mask=mask))
+        truths.append(ViewTruth(**maps, normal=normals, normal_mask=mask))
         predictions.append({"rgb": image[..., :3], "alpha": image[..., 3], "normal": normals} | maps)
     eye = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
     lens = np.ones((2, 4), np.float32)
@@ -154,7 +154,7 @@ def test_protocol_scores_the_truth_as_perfect():
 
 def test_protocol_is_null_without_truth():
     predictions, data, _ = make_inputs()
-    result = evaluate_maps(predictions, data, [ViewTruth("a"), ViewTruth("b")], light=np.ones((8, 16, 3)))
+    result = evaluate_maps(predictions, data, [ViewTruth(), ViewTruth()], light=np.ones((8, 16, 3)))
     assert [key for key in KEYS if result[key] is not None] == ["novel_view", "views"]
 
 
@@ -188,7 +188,7 @@ def where(mask: np.ndarray, inside: object, outside: object) -> np.ndarray:
 def test_materials_are_compared_where_both_have_an_object():
     """Inside roughness is 0.1 too high in half of the columns and 0.3 too low in the others, outside all is wrong."""
     even = np.broadcast_to(np.arange(SIZE) % 2 == 0, (SIZE, SIZE))
-    truth = ViewTruth("a", roughness=np.full((SIZE, SIZE), 0.5, np.float32), metallic=where(even, 1.0, 0.0))
+    truth = ViewTruth(roughness=np.full((SIZE, SIZE), 0.5, np.float32), metallic=where(even, 1.0, 0.0))
     prediction = {
         "alpha": where(PREDICTED, 1.0, 0.5),
         "roughness": where(BOTH, np.where(even, 0.6, 0.2), 5.0),
@@ -204,7 +204,7 @@ def test_normals_are_compared_where_the_prediction_is_opaque_and_the_truth_has_s
     """30 degrees off there and opposite elsewhere; the image's own coverage does not matter."""
     up = np.float32([0, 0, 1])
     tilted = np.float32([0, 0.5, math.sqrt(0.75)])
-    truth = ViewTruth("a", normal=np.broadcast_to(up, (SIZE, SIZE, 3)), normal_mask=TRUE)
+    truth = ViewTruth(normal=np.broadcast_to(up, (SIZE, SIZE, 3)), normal_mask=TRUE)
     prediction = {"alpha": where(PREDICTED, 1.0, 0.5), "normal": where(BOTH[..., None], tilted, -up)}
     scores = evaluate_maps([prediction], dataset(picture(0.5, 0.0)), [truth])
     assert scores["normal_mae_deg"] == pytest.approx(30.0, abs=1e-3)
@@ -214,13 +214,13 @@ def test_views_stand_on_white_once():
     """A photo of 0.2 that covers half of a pixel looks like 0.6 that covers all of it."""
     images = dataset(picture(0.2, 0.5))
     whole = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE), np.float32)}
-    assert evaluate_maps([whole], images, [ViewTruth("a")])["novel_view"]["psnr"] == pytest.approx(100.0, abs=1.0)
+    assert evaluate_maps([whole], images, [ViewTruth()])["novel_view"]["psnr"] == pytest.approx(100.0, abs=1.0)
 
 
 def test_albedos_stand_on_white_by_their_own_coverage():
     """Equal where both are opaque. Elsewhere linear 0.8 at 0.5 and 0.01 at 0.25, in sRGB over white."""
     edge = ~BOTH
-    truth = ViewTruth("a", albedo=where(edge[..., None], [0.01] * 3, [0.3] * 3))
+    truth = ViewTruth(albedo=where(edge[..., None], [0.01] * 3, [0.3] * 3))
     prediction = {"alpha": where(edge, 0.5, 1.0), "albedo": where(edge[..., None], [0.8] * 3, [0.3] * 3)}
     scores = evaluate_maps([prediction], dataset(picture(0.5, where(edge, 0.25, 1.0))), [truth])["albedo"]
     bright, dark = linear_to_srgb(np.float32([0.8, 0.01]))
@@ -232,15 +232,13 @@ def test_albedos_stand_on_white_by_their_own_coverage():
 def test_the_light_is_scaled_to_the_truth_and_judged_by_the_truths_white():
     light, truth = np.full((16, 32, 3), 0.7), np.full((16, 32, 3), 0.5)
     light[4:7, 8:12], truth[5:9, 20:22] = 9.0, 30.0
-    found = evaluate_maps(
-        [{"alpha": np.ones((SIZE, SIZE))}], dataset(picture(0.5, 1.0)), [ViewTruth("a")], light, truth
-    )
+    found = evaluate_maps([{"alpha": np.ones((SIZE, SIZE))}], dataset(picture(0.5, 1.0)), [ViewTruth()], light, truth)
     assert found["light_psnr"] == pytest.approx(metrics.light_psnr(light, truth))
     assert abs(found["light_psnr"] - metrics.light_psnr(truth, light)) > 0.5
 
 
 def test_the_distance_is_asked_for_views_and_for_albedo():
-    truth = ViewTruth("a", albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
+    truth = ViewTruth(albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
     prediction = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
     scores = evaluate_maps(
         [prediction],

@@ -92,7 +92,7 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
     assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert test.world_poses == pytest.approx(orbit(2, 3.0233467, 30, 20), abs=1e-4)
 
-    for truth, maps in zip(load_view_truths(test), recorder.maps[3:5]):
+    for name, truth, maps in zip(test.frame_names, load_view_truths(test), recorder.maps[3:5]):
         solid = maps["alpha"] > 0.92
         assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
         encoded = linear_to_srgb if layout == "blender" else np.asarray  # the other one keeps albedo linear
@@ -102,7 +102,7 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
         if layout == "blender":
             assert np.abs(truth.roughness[solid] - maps["roughness"][solid]).max() <= HALF_STEP
             assert np.abs(truth.metallic[solid] - maps["metallic"][solid]).max() <= HALF_STEP
-            stored = read_image(tmp_path / f"test/{truth.name}_normal.exr")
+            stored = read_image(tmp_path / f"test/{name}_normal.exr")
             assert stored[..., :3] == pytest.approx(maps["smooth_normal"] * maps["alpha"][..., None], abs=1e-3)
         else:
             assert truth.roughness is None and truth.metallic is None

@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 def check_usage(args: argparse.Namespace) -> None:
     """Refuses options that exclude each other, and files of other kinds in the place of results. Raises InputError
     where two options exclude each other, or a file would be lost; the message names them."""
-    from splitnerf.evaluate.scoring import evaluation_path, holds_evaluation, is_asset
+    from splitnerf.evaluate.scoring import evaluation_path, is_asset
     from splitnerf.files import refuse_others
     from splitnerf.run_folder import data_of
 
@@ -124,8 +124,7 @@ def check_usage(args: argparse.Namespace) -> None:
     if args.table:
         refuse_others(args.table, b"| scene |", option="--table")
     for path in [args.out] if args.out else map(evaluation_path, assets):
-        if path.is_file() and path.stat().st_size and not holds_evaluation(path):
-            raise InputError(f"{path}: is not an earlier result, and would be replaced; give another --out")
+        refuse_others(path, b'"novel_view"')
 
 
 def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:

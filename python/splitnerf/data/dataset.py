@@ -288,7 +288,7 @@ def load_dataset(
         root=root,
         split=split,
         downscale=downscale,
-        images=loader.photos,
+        images=Photos(loader.codes, loader.exposures),
         poses=poses.astype(np.float32),
         intrinsics=intrinsics.astype(np.float32),
         frame_names=[frame.name for frame in frames],

@@ -32,7 +32,6 @@ from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import check_shape, lens_intrinsics, undistort
 from splitnerf.data.pixels import (
     GB,
-    Photos,
     averaged_codes,
     decoded,
     encoded,
@@ -392,11 +391,6 @@ class Loader:
         smaller = bool((self.sizes != self.sizes.max(axis=0)).any())
         self.known = self._known if smaller or any(photo.seen is not None for photo in photos) else None
         return photos
-
-    @property
-    def photos(self) -> Photos:
-        """The pixels."""
-        return Photos(self.codes, self.exposures)
 
     def _load(self, i: int, mask_kind: str) -> Photo:
         frame, found = self.frames[i], self.separated

@@ -43,7 +43,6 @@ class ViewTruth:
     """Truth of one view at the dataset's downscale; what does not exist is None.
 
     Attributes:
-        name: The frame's name.
         albedo: [H, W, 3] float32, linear, straight.
         roughness: [H, W] float32, perceptual, in [0, 1].
         metallic: [H, W] float32 in [0, 1].
@@ -51,7 +50,6 @@ class ViewTruth:
         normal_mask: [H, W] bool, the pixels whose normal can be scored.
     """
 
-    name: str
     albedo: np.ndarray | None = None
     roughness: np.ndarray | None = None
     metallic: np.ndarray | None = None
@@ -199,8 +197,7 @@ def relight_maps(dataset: Dataset, folder: Path | None = None, protocol: str | N
 
 def _load_view(dataset: Dataset, view: int) -> ViewTruth:
     image_path, factor = dataset.image_paths[view], dataset.downscale
-    in_folder = image_path.name == view_folders.PHOTO
-    truth = ViewTruth(image_path.parent.name if in_folder else image_path.stem)
+    in_folder, truth = image_path.name == view_folders.PHOTO, ViewTruth()
 
     def read(ending: str) -> np.ndarray | None:
         return read_map(dataset, view, _map_path(image_path, ending), MAPS[ending])

@@ -53,9 +53,9 @@ def evaluation_table(evaluations: Sequence[tuple[str, dict]]) -> str:
     over the scenes that have the value, and is marked with their number where it is not all."""
     rows = [(name, values_of(evaluation)) for name, evaluation in evaluations]
     lines = [["scene", *(title for _, title, *_ in COLUMNS)], ["---"] + ["---:"] * len(COLUMNS)]
-    lines += [[name] + [_cell(values[key], text) for key, _, text, _ in COLUMNS] for name, values in rows]
+    lines += [[name] + [_cell(text, values[key]) for key, _, text, _ in COLUMNS] for name, values in rows]
     if len(rows) > 1:
-        lines.append(["**mean**"] + [_mean([v[key] for _, v in rows], text) for key, _, text, _ in COLUMNS])
+        lines.append(["**mean**"] + [_cell(text, *(v[key] for _, v in rows)) for key, _, text, _ in COLUMNS])
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
@@ -65,17 +65,14 @@ def table_of_lights(evaluation: dict, label: str) -> str:
     rows = {f"{label}, this scene": [values[name] for name, *_ in columns], **PUBLISHED}
     texts = ("{:.2f}", "{:.3f}", "{:.3f}") * 2
     lines = [["", *(title for _, title, *_ in columns)]]
-    lines += [[name, *map(_cell, [*row, *[None] * 3][:6], texts)] for name, row in rows.items()]
+    lines += [[name, *map(_cell, texts, [*row, *[None] * 3])] for name, row in rows.items()]
     widths = [max(map(len, column)) for column in zip(*lines)]
     shown = ["  ".join([name.ljust(widths[0]), *map(str.rjust, cells, widths[1:])]) for name, *cells in lines]
     return "\n".join([*shown, SOURCE])
 
 
-def _cell(value: float | None, text: str) -> str:
-    return "-" if value is None else text.format(value)
-
-
-def _mean(values: Sequence[float | None], text: str) -> str:
+def _cell(text: str, *values: float | None) -> str:
+    """The mean of the values that there are, and their number where it is not all; "-" without any."""
     known = [value for value in values if value is not None]
     if not known:
         return "-"

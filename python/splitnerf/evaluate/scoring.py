@@ -303,14 +303,6 @@ def read_evaluation(target: Path) -> dict:
     return scores
 
 
-def holds_evaluation(path: Path) -> bool:
-    """Whether a file is an evaluation."""
-    try:
-        return is_evaluation(read_json(path, "novel_view"))
-    except InputError:
-        return False
-
-
 def is_evaluation(content: dict) -> bool:
     """Whether contents of a file are scores as an evaluation writes them."""
     if "novel_view" not in content:

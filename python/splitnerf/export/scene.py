@@ -53,10 +53,6 @@ class Placing:
     scale: float = 1.0
     height: float | None = None
 
-    @property
-    def moves(self) -> bool:
-        return self != Placing()
-
     def of(self, vertices: np.ndarray) -> tuple[np.ndarray, float]:
         """The origin [3] and the scale for an asset with vertices [n, 3] in the data's world."""
         low, high = (end.astype(np.float64) for end in (vertices.min(axis=0), vertices.max(axis=0)))
@@ -69,7 +65,7 @@ def write_textured(
 ) -> tuple[np.ndarray, float]:
     """Writes mesh.glb, mesh.obj, mesh.usdz as requested; returns the origin and the scale of the files."""
     origin, scale = placing.of(asset.vertices)
-    if placing.moves:
+    if placing != Placing():
         asset = dataclasses.replace(asset, vertices=((asset.vertices - origin) * scale).astype(np.float32))
     if "glb" in formats:
         write_glb(out / "mesh.glb", asset, occlusion)
