@@ -50,11 +50,9 @@ def stated_colours(path: Path) -> Stated:
     """What a photo's file states of its colours; nothing, with a note, where that cannot be read."""
     try:
         with Image.open(path) as image:
-            said, codes, (space, index) = (
-                image.info,
-                coded_space(path) if image.format == "PNG" else (),
-                exif_space(image),
-            )
+            said, (space, index) = image.info, exif_space(image)
+            source = oiio.ImageInput.open(str(path)) if image.format == "PNG" else None
+        codes = (source.spec().getattribute("CICP") if source else None) or ()  # of the primaries, the curve and others
     except Exception:  # of any kind where a file is damaged
         note_once(f"{path.parent}: what photos state of their colours cannot be read; they count as sRGB", path.name)
         return Stated()
@@ -80,12 +78,6 @@ def exif_space(image: Image.Image) -> tuple[int | None, str]:
         return exif.get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace), index.rstrip("\0 ")
     except Exception:  # of any kind
         return None, ""
-
-
-def coded_space(path: Path) -> tuple[int, ...]:
-    """The codes of primaries and of the curve that a PNG file states; none where it does not."""
-    source = oiio.ImageInput.open(str(path))
-    return tuple((source.spec().getattribute("CICP") if source else None) or ())[:2]
 
 
 def to_srgb(codes: np.ndarray, path: Path) -> np.ndarray:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from tqdm import tqdm
 
 from splitnerf.data.asset import Asset, check_place, unit
 from splitnerf.data.dataset import Dataset, load_dataset, spread
@@ -122,15 +121,12 @@ def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], sp
         for index in range(len(dataset)):
             read_relit(dataset, index, name)
     images = {}
-    with tqdm(total=len(maps) * len(dataset), desc="relighting", unit="view", leave=False, disable=None) as progress:
-        for name, path in maps.items():
-            environment = read_environment(path)
-            images[name] = []
-            for index in range(len(dataset)):
-                rendered = render_view(renderer, dataset, index, environment, spp)
-                image = np.dstack([straight_srgb(rendered["radiance"], rendered["alpha"]), rendered["alpha"]])
-                images[name].append(to_uint8(image))
-                progress.update()
+    for name, path in maps.items():
+        environment, images[name] = read_environment(path), []
+        for index in tracked(range(len(dataset)), f"relighting by {name}, view"):
+            rendered = render_view(renderer, dataset, index, environment, spp)
+            image = np.dstack([straight_srgb(rendered["radiance"], rendered["alpha"]), rendered["alpha"]])
+            images[name].append(to_uint8(image))
     return RelitViews(images, dataset, spp)
 
 

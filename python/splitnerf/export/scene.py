@@ -89,8 +89,7 @@ def write_delivered(
     origin, scale = write_textured(out, formats, asset, occlusion, placing)
     mesh = read_mesh(run / "mesh.ply")
     if "ply" in formats:
-        placed = mesh.copy()
-        placed.vertices = (mesh.vertices - origin) * scale
+        placed = mesh.copy().apply_translation(-origin).apply_scale(scale)
         with atomic_path(out / "mesh.ply") as temporary:
             temporary.write_bytes(placed.export(file_type="ply"))
     for name in ("environment.exr", "environment.hdr"):

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.errors import InputError
 from splitnerf.files import locked
+from splitnerf.progress import tracked
 from splitnerf.relight.background import Background, compose
 from splitnerf.relight.cameras import View, bounding_sphere
 from splitnerf.relight.output import (
@@ -130,31 +129,29 @@ def render_frames(
     renderer = AssetRenderer(asset)
     ground = lowest(asset) if settings.shadow_catcher else None
     exposure = 2.0**settings.exposure
-    with tqdm(total=len(lights) * len(views), unit="frame", file=sys.stderr, disable=None) as bar:
-        for light, folder in zip(lights, folders):
-            frames = []
-            for index, view in enumerate(views):
-                turned = rotate_environment(light, view.light_degrees)
-                images = renderer.render(
-                    turned,
-                    view.pose,
-                    view.intrinsics,
-                    view.width,
-                    view.height,
-                    spp=settings.spp,
-                    bounces=settings.bounces,
-                    seed=settings.seed + index,
-                    catcher_height=ground,
-                )
-                linear = compose(images, background.behind(view, turned, exposure), exposure)
-                write_frame(folder, index, linear, with_alpha=background.transparent)
-                if settings.gif or settings.mp4:
-                    frames.append(display_frame(linear))
-                bar.update()
-            if settings.gif:
-                write_gif(folder / GIF, frames, settings.fps)
-            if settings.mp4:
-                write_mp4(folder / MP4, frames, settings.fps)
+    for light, folder in zip(lights, folders):
+        frames = []
+        for index, view in enumerate(tracked(views, f"{folder.name}, frame")):
+            turned = rotate_environment(light, view.light_degrees)
+            images = renderer.render(
+                turned,
+                view.pose,
+                view.intrinsics,
+                view.width,
+                view.height,
+                spp=settings.spp,
+                bounces=settings.bounces,
+                seed=settings.seed + index,
+                catcher_height=ground,
+            )
+            linear = compose(images, background.behind(view, turned, exposure), exposure)
+            write_frame(folder, index, linear, with_alpha=background.transparent)
+            if settings.gif or settings.mp4:
+                frames.append(display_frame(linear))
+        if settings.gif:
+            write_gif(folder / GIF, frames, settings.fps)
+        if settings.mp4:
+            write_mp4(folder / MP4, frames, settings.fps)
 
 
 def _check_animation(views: list[View], settings: Settings) -> None:
