@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -21,8 +21,7 @@ OCCLUSION_RAYS = 64
 MIN_UP = 0.02  # least z of a tangent-space normal
 
 
-@dataclass(frozen=True)
-class Texels:
+class Texels(NamedTuple):
     """The texels whose centres a triangle covers: `index` [k] (row * size + column), `triangle` [k], and float32
     barycentric `weights` [k, 3]."""
 
@@ -38,10 +37,7 @@ class Texels:
 
 def rasterise(uv: np.ndarray, faces: np.ndarray, size: int) -> Texels:
     """Finds the triangle under each texel's centre by tracing straight down onto the mesh laid flat."""
-    parts = list(bands(uv, faces, size))
-    return Texels(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("index", "triangle", "weights"))
-    )
+    return Texels(*map(np.concatenate, zip(*bands(uv, faces, size))))
 
 
 def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
