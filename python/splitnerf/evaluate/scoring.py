@@ -123,7 +123,7 @@ def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], sp
     images = {}
     for name, path in maps.items():
         environment, images[name] = read_environment(path), []
-        for index in tracked(range(len(dataset)), f"relighting by {name}, view"):
+        for index in tracked(range(len(dataset)), "relighting, view"):
             rendered = render_view(renderer, dataset, index, environment, spp)
             image = np.dstack([straight_srgb(rendered["radiance"], rendered["alpha"]), rendered["alpha"]])
             images[name].append(to_uint8(image))

@@ -131,7 +131,7 @@ def render_frames(
     exposure = 2.0**settings.exposure
     for light, folder in zip(lights, folders):
         frames = []
-        for index, view in enumerate(tracked(views, f"{folder.name}, frame")):
+        for index, view in enumerate(tracked(views, "relighting, frame")):
             turned = rotate_environment(light, view.light_degrees)
             images = renderer.render(
                 turned,
