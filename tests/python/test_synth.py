@@ -11,10 +11,11 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, read_image, write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths, read_relit, relight_maps
 from splitnerf.evaluate.scoring import FIRST_SEED, asset_mesh
+from splitnerf.relight.cameras import bounding_sphere
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.commands import synth as synth_command
 from splitnerf_tools.synth.orbits import orbit, spiral
-from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise, unit_sphere
+from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 from tiny_runs import command
@@ -72,7 +73,8 @@ def close_images(image, maps):
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_files_hold_what_was_rendered(files, tmp_path, layout):
     asset = read_asset(files / "balls.glb")
-    recorder, settings = Recorder(normalised(asset, *unit_sphere(asset))), SynthSettings(SIZE, 3, 2, 4, layout)
+    centre, radius = bounding_sphere(asset)
+    recorder, settings = Recorder(normalised(asset, centre, 1 / radius)), SynthSettings(SIZE, 3, 2, 4, layout)
     writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
     light = np.full((8, 16, 3), 0.5, np.float32)
     relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from splitnerf.relight.studio import direction
+from splitnerf.relight.cameras import look_at
 
 
 def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float = 0.0) -> np.ndarray:
@@ -41,10 +41,5 @@ def orbit(n: int, distance: float, elevation: float, swing: float = 0.0, start: 
 
 
 def _poses(azimuths: np.ndarray, elevations: np.ndarray, distance: float) -> np.ndarray:
-    poses = np.tile(np.eye(4), (len(azimuths), 1, 1))
-    for pose, azimuth, elevation in zip(poses, azimuths, elevations):
-        back = direction(azimuth, elevation)
-        right = np.cross([0, 0, 1], back)
-        right /= np.linalg.norm(right)
-        pose[:3] = np.stack([right, np.cross(back, right), back, distance * back], axis=1)
-    return poses
+    angles = np.radians([azimuths, elevations]).T
+    return np.array([look_at(np.zeros(3), *pair, distance) for pair in angles]).reshape(-1, 4, 4)

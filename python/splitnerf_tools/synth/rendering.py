@@ -14,6 +14,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.truth import PREFIX
 from splitnerf.errors import InputError, note
 from splitnerf.files import LOCK, locked
+from splitnerf.relight.cameras import bounding_sphere
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from tqdm import tqdm
 
@@ -96,7 +97,8 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
     original = read_asset(asset)
     if any(any(material.emission) for material in original.materials):
         note(f"{asset}: emits light; left out, the environment is the only light")
-    centre, scale = unit_sphere(original)
+    centre, radius = bounding_sphere(original)
+    scale = 1 / radius
     renderer = AssetRenderer(normalised(original, centre, scale))
     with locked(out):
         write_placed_glb(asset, out / "asset.glb", centre, scale)
@@ -148,13 +150,6 @@ def turn_to(pose: np.ndarray, first: np.ndarray) -> np.ndarray:
     angle = np.arctan2(first[1, 3], first[0, 3]) - np.arctan2(pose[1, 3], pose[0, 3])
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-
-def unit_sphere(asset: Asset) -> tuple[np.ndarray, float]:
-    """Centre [3] of the asset's bounding box, and the scale that then brings its farthest vertex to distance 1."""
-    used = asset.vertices[np.unique(asset.triangles)].astype(np.float64)
-    centre = (used.min(axis=0) + used.max(axis=0)) / 2
-    return centre, float(1 / np.linalg.norm(used - centre, axis=1).max())
 
 
 def normalised(asset: Asset, centre: np.ndarray, scale: float) -> Asset:
