@@ -8,8 +8,9 @@ import pytest
 from splitnerf.cli import DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
+from splitnerf.evaluate.score_table import values_of
 from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
-from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table, score_of
+from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table
 from test_train import flat
 from tiny_runs import SMALL, as_options, refused
 
@@ -18,7 +19,7 @@ def score(row: str, seed: int, relight: float | None, novel_view: float = 30.0) 
     maps = {"albedo": {"psnr": 20.0}, "normal_mae_deg": 5.0, "roughness_mae": 0.1, "metallic_balanced_accuracy": None}
     views = {"relight": relight and {"psnr": relight, "ssim": 0.91, "lpips": None}, "novel_view": {"psnr": novel_view}}
     evaluation = maps | views | {"light_psnr": 15.0, "seconds": 360.0}
-    return score_of("scene", row, FULL, seed, evaluation)
+    return Score("scene", row, seed, values_of(evaluation))
 
 
 @pytest.mark.parametrize(("name", "n_rows"), [("cpu", 22), ("paper", 7)])

@@ -10,11 +10,12 @@ from pathlib import Path
 from splitnerf.config import Config
 from splitnerf.data.json_files import read_json
 from splitnerf.errors import InputError
+from splitnerf.evaluate.score_table import values_of
 from splitnerf.evaluate.scoring import Protocol
 from splitnerf.pipeline import evaluate_run, reconstruct
 
 from splitnerf_tools.ablate.rows import Row
-from splitnerf_tools.ablate.scores import CLOSE, Score, differences, score_of
+from splitnerf_tools.ablate.scores import CLOSE, Score, differences
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ def ablate(plan: AblationPlan, show: Callable[[list[Score]], None]) -> list[Scor
     scores: list[Score] = []
 
     def run(scene: Path, row: Row, seed: int) -> None:
-        scores.append(score_of(scene.resolve().name, row.name, row.reference, seed, run_row(plan, scene, row, seed)))
+        values = values_of(run_row(plan, scene, row, seed))
+        scores.append(Score(scene.resolve().name, row.name, seed, values, row.reference))
         show(scores)
 
     for scene in plan.scenes:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from splitnerf.evaluate.score_table import COLUMNS, values_of
+from splitnerf.evaluate.score_table import COLUMNS
 
 from splitnerf_tools.ablate.rows import FULL
 
@@ -47,11 +47,6 @@ class Difference:
             return "no difference" if abs(self.mean) < CLOSE else f"{self.mean:+.2f} dB"
         text = f"{self.mean:+.2f} ± {self.error:.2f} dB"
         return f"no difference ({text})" if abs(self.mean) < 2 * self.error else text
-
-
-def score_of(scene: str, row: str, reference: str, seed: int, evaluation: dict) -> Score:
-    """The columns of an evaluation.json."""
-    return Score(scene, row, seed, values_of(evaluation), reference)
 
 
 def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
