@@ -17,6 +17,7 @@ from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import write_image
 from splitnerf.export.scene import surface_of
 from splitnerf.export.surface import surface_materials
+from splitnerf.export.writers import glb_content
 from splitnerf.relight.studio import STUDIO_LIGHTS
 from splitnerf.render.model import SceneModel
 from splitnerf.training.loop import Training
@@ -26,7 +27,7 @@ from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.live import Live
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.training_asset import training_asset, training_glb
+from splitnerf_tools.view.training_asset import LINEAR, training_asset
 from splitnerf_tools.view.training_page import training_page
 from test_train import flat, same
 from tiny_runs import tiny
@@ -97,7 +98,7 @@ def test_a_training_asset_has_the_materials_of_the_fields(tmp_path):
             parameter.add_(0.3 * torch.randn_like(parameter))
     world_from_box = np.diag([2.0, 2.0, 2.0, 1.0])
     world_from_box[:3, 3] = 1, 2, 3
-    (tmp_path / "grown.glb").write_bytes(training_glb(training_asset(model, world_from_box, 24)))
+    (tmp_path / "grown.glb").write_bytes(glb_content(training_asset(model, world_from_box, 24), filtering=LINEAR))
     asset = read_asset(tmp_path / "grown.glb")
     points = ((asset.vertices - [1, 2, 3]) / 2).astype(np.float32)
     assert np.abs(surface_of(model).sdf(torch.from_numpy(points)).detach().numpy()).max() < 0.1  # cells are 0.13 wide

@@ -14,13 +14,14 @@ from splitnerf.config.settings import UNLIMITED
 from splitnerf.data.asset import Asset
 from splitnerf.data.normalisation import transform_points
 from splitnerf.errors import InputError, plain
+from splitnerf.export.writers import glb_content
 from splitnerf.training.loop import Training
 from splitnerf.training.metrics import METRICS, read_metrics
 from splitnerf.training.observer import Event, Request
 
 from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedLight
 from splitnerf_tools.view.events import EventStream
-from splitnerf_tools.view.training_asset import training_asset, training_glb
+from splitnerf_tools.view.training_asset import LINEAR, training_asset
 
 STATE_EVERY = 0.5  # seconds between two states
 # least seconds between two surfaces, and the largest share of the time that they take
@@ -206,7 +207,7 @@ class Live:
             return old.version
         self.shown.add_light(ViewedLight("recovered light", light), self._light)
         self.shown.sources[0] = Source(
-            self.name, asset, lambda: training_glb(asset), self._light, version=old.version + 1
+            self.name, asset, lambda: glb_content(asset, filtering=LINEAR), self._light, version=old.version + 1
         )
         return old.version + 1
 

@@ -9,7 +9,6 @@ from splitnerf.data.normalisation import transform_points
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.scene import surface_of
 from splitnerf.export.surface import surface_materials
-from splitnerf.export.writers import glb_content
 from splitnerf.render.model import SceneModel
 
 RESOLUTION = 128  # nodes along an edge of the box
@@ -37,6 +36,8 @@ def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: in
     vertices, faces = extract_mesh(surface.sdf, model.config.constants.box, resolution)
     albedo, roughness, metallic, normals = surface_materials(surface, vertices)
     pairs = np.clip(np.column_stack([roughness, metallic]), 0, 1)
+    steps = np.linspace(0, 1, LEVELS, dtype=np.float32)
+    all_pairs = np.stack(np.meshgrid(steps, steps), axis=2)  # roughness grows to the right, metallic downwards
     return Asset(
         name="growing",
         vertices=transform_points(world_from_box, vertices),
@@ -45,16 +46,5 @@ def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: in
         material_ids=np.zeros(len(faces), np.int32),
         colors=np.clip(albedo, 0, 1),
         uv=((pairs * (LEVELS - 1) + 0.5) / LEVELS).astype(np.float32),
-        materials=[Material(metallic=1.0, roughness_metallic_texture=all_pairs(LEVELS))],
+        materials=[Material(metallic=1.0, roughness_metallic_texture=all_pairs)],
     )
-
-
-def all_pairs(levels: int) -> np.ndarray:
-    """[levels, levels, 2] float32: roughness grows to the right, metallic downwards, both from 0 to 1."""
-    steps = np.linspace(0, 1, levels, dtype=np.float32)
-    return np.stack(np.meshgrid(steps, steps), axis=2)
-
-
-def training_glb(asset: Asset) -> bytes:
-    """The bytes of the asset's GLB."""
-    return glb_content(asset, filtering=LINEAR)
