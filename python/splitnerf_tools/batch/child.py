@@ -64,18 +64,8 @@ def train_scene(work: Work) -> Outcome:
     stopped = False
     if not _free(Path(work.run)):
         return Outcome(None, f"{work.run}: is in use by another program", False)
-    command = [
-        sys.executable,
-        "-m",
-        "splitnerf",
-        "train",
-        work.data,
-        "--out",
-        work.run,
-        "--resume",
-        "auto",
-        *work.options,
-    ]
+    options = ["--out", work.run, "--resume", "auto", *work.options]
+    command = [sys.executable, "-m", "splitnerf", "train", work.data, *options]
     hidden = ("RAY_AUTH_TOKEN", "RAY_AUTH_MODE")  # not needed there
     environment = {key: value for key, value in os.environ.items() if key not in hidden}
     environment |= {"OMP_NUM_THREADS": str(work.threads), "PYTHONUNBUFFERED": "1"}

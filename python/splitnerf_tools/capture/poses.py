@@ -173,7 +173,9 @@ def reconstruct(
             pycolmap.match_image_pairs(database, pairing_options=pairing)
         model = _best_model(database, images, folder, pipeline, lambda share: report("cameras", share))
         if model is None or model.num_reg_images() < MIN_PHOTOS:
-            if _count_keypoints(database) < LEAST_DETAIL * n:
+            with closing(sqlite3.connect(database)) as base:
+                n_features = base.execute("SELECT SUM(rows) FROM keypoints").fetchone()[0] or 0
+            if n_features < LEAST_DETAIL * n:
                 raise InputError(
                     f"{photos[0].path.parent}: the photos show too little detail; put the object on a pattern"
                 )
@@ -407,12 +409,6 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         log.minloglevel, log.alsologtostderr = before
-
-
-def _count_keypoints(database: Path) -> int:
-    """The features of all photos together."""
-    with closing(sqlite3.connect(database)) as base:
-        return base.execute("SELECT SUM(rows) FROM keypoints").fetchone()[0] or 0
 
 
 def _is_sound(database: Path) -> bool:

@@ -73,12 +73,14 @@ def run(args: argparse.Namespace) -> int:
     from splitnerf_tools.capture.prepare import PrepareSettings, prepare
 
     settings = PrepareSettings(args.max_size, args.masks, args.frames, args.seed, args.turntable)
+    steps = STEPS | ({"masks": GIVEN_MASKS} if args.masks else {})
     with ended_by_signals(), Progress(0.0) as bar:  # again: pycolmap, just imported, has taken SIGTERM
         most = 0.0
 
         def report(step: str, share: float) -> None:
             nonlocal most
-            most = max(most, overall(step, share, args.masks is not None))  # cameras may be searched for again
+            done = sum(list(steps.values())[: list(steps).index(step)]) + share * steps[step]
+            most = max(most, min(done / sum(steps.values()), 1.0))  # cameras may be searched for again
             bar.show(most, step)
 
         try:
@@ -89,10 +91,3 @@ def run(args: argparse.Namespace) -> int:
     print(f"{n} of {n + lost} photos, reprojection error {scene.error:.2f} pixels: {args.out}")
     print(f"look at {args.out / 'prepare.html'}, then: splitnerf train {args.out}")
     return DONE
-
-
-def overall(step: str, share: float, given_masks: bool) -> float:
-    """The share of all that is done when a share of a step is."""
-    steps = STEPS | ({"masks": GIVEN_MASKS} if given_masks else {})
-    before = list(steps)[: list(steps).index(step)]
-    return min((sum(steps[name] for name in before) + share * steps[step]) / sum(steps.values()), 1.0)

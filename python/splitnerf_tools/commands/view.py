@@ -41,6 +41,8 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    import webbrowser
+
     from splitnerf.run_folder import data_of
 
     from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
@@ -56,15 +58,9 @@ def run(args: argparse.Namespace) -> int:
         if args.host != LOCAL:
             print(f"splitnerf: note: listens at {args.host}: whoever knows the address below can look", file=sys.stderr)
         print(server.url, flush=True)
-        if not args.no_browser:
-            open_browser(server.url)
+        # Only where there is a desktop: on a terminal alone, a text browser would take it over.
+        desktop = sys.platform == "darwin" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        if desktop and not args.no_browser:
+            webbrowser.open(server.url)
         server.serve_forever()
     return DONE
-
-
-def open_browser(url: str) -> None:
-    """Opens the page where there is a desktop: on a terminal alone, a text browser would take it over."""
-    import webbrowser
-
-    if sys.platform == "darwin" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        webbrowser.open(url)

@@ -262,10 +262,6 @@ def optimiser() -> dict:
     )
 
 
-def neighbours() -> dict:
-    return dict(gradients=pattern(N, 3) - 0.8, weights=pattern(16), beside=torch.arange(N - 16) % 16)
-
-
 OWN: dict[str, Callable[[], dict[str, object]]] = {
     "adamw_steps_": optimiser,
     "cached_occlusion": lambda: dict(
@@ -278,7 +274,9 @@ OWN: dict[str, Callable[[], dict[str, object]]] = {
     "cached_visibility": lambda: dict(positions=0.2 * sphere(N), normals=axis(0.0, 0.0, 1.0), radiance=pattern(1, 3)),
     "composite": lambda: dict(values=pattern(N, 3), opacity=pattern(3), least_opacity=0.75),
     "draw_rays": camera,
-    "gradient_losses": neighbours,
+    "gradient_losses": lambda: dict(
+        gradients=pattern(N, 3) - 0.8, weights=pattern(16), beside=torch.arange(N - 16) % 16
+    ),
     "incoming_light": mirror,
     "light_lookup": sphere_light,
     "march_rays": lambda: dict(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from statistics import fmean
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -109,13 +110,9 @@ def curve_data(title: str, series: Mapping[str, Series], *, log: bool = False) -
         name: [[points[x] for x in group if x in points] for group in groups] for name, points in kept.items() if points
     }
     lines = [
-        {"name": name, "values": [_mean(values) if values else None for values in rows]} for name, rows in found.items()
+        {"name": name, "values": [fmean(values) if values else None for values in rows]} for name, rows in found.items()
     ]
-    return {"title": title, "log": log, "x": [_mean(group) for group in groups], "series": lines}
-
-
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
+    return {"title": title, "log": log, "x": [fmean(group) for group in groups], "series": lines}
 
 
 def _linear_ticks(low: float, high: float, count: int) -> list[float]:

@@ -99,7 +99,8 @@ class RadianceField(nn.Module):
             shift = (torch.rand_like(edges[:, 1:-1]) - 0.5) / n_first
             edges = torch.cat([edges[:, :1], edges[:, 1:-1] + shift, edges[:, -1:]], dim=1)
         points = measure.points(edges)
-        first_density = self._without(self._first_density(points) + FIRST_LOG, points, hidden)
+        first_out = self.first(self._encoded(self.coarse, points))[..., 0]
+        first_density = self._without(first_out + FIRST_LOG, points, hidden)
         first = self._weights(first_density, measure.distances(edges))
         finer = resampled(edges, first.detach(), n, jitter)
         points, distances = measure.points(finer), measure.distances(finer)
@@ -114,9 +115,6 @@ class RadianceField(nn.Module):
         ray, sample = (~(weights.detach() <= LEAST_WEIGHT)).nonzero(as_tuple=True)  # NaN too
         colours = torch.sigmoid(self.head(torch.cat([features[ray, sample], harmonics(rays_d)[ray]], dim=-1)))
         return torch.zeros_like(rays_d).index_add(0, ray, weights[ray, sample, None] * colours)
-
-    def _first_density(self, points: Tensor) -> Tensor:
-        return self.first(self._encoded(self.coarse, points))[..., 0]
 
     @staticmethod
     def _without(log_density: Tensor, points: Tensor, hidden: Callable[[Tensor], Tensor] | None) -> Tensor:

@@ -26,9 +26,8 @@ NOISE = 3.0  # standard deviations of the table's cells by which cells stand out
 SPARSE = 0.1  # smoothed weight of a cell below which nothing is known of it
 VAGUE = 0.03  # height over the table from which a point below an overhang is the object's, scene units
 GAP = 3  # cells that close holes in what stands over the foot
-HINT = (
-    0.02  # what the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge
-)
+# What the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge.
+HINT = 0.02
 UNDER = 10.0  # how much more it counts where the cell is high and the object is over it
 CONTRAST = 33.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
 
@@ -83,9 +82,8 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     weights = _smoothed(weights, np.ones_like(weights))
     known = (weights > SPARSE) & ~hidden
     inside = random_walk(HINT * (MOST / n) ** 2 * _by_height(medians, counts, over), colour, known, CONTRAST) - 0.5
-    inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = (
-        0.5  # no photo shows it: it is within the foot
-    )
+    # What no photo shows is within the foot.
+    inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = 0.5
     return Foot(table, inside, np.where(hidden, 1.0, -1.0).astype(np.float32))
 
 

@@ -23,9 +23,8 @@ from splitnerf_tools.separation.training import train_field
 
 SHEET = "sheet.jpg"
 SHOWN, DIMMED = 12, 0.25  # photos on the sheet, and the factor of what is around the object
-BEFORE_MIDDLE = (
-    0.7  # how far before the middle of the views a wall may stand, scene units: seen from one side, it is vague
-)
+# How far before the middle of the views a wall may stand, scene units: seen from one side, it is vague.
+BEFORE_MIDDLE = 0.7
 NEAR_TABLE = 1.5  # distance from the middle within which points tell of the table, scene units
 MOST_POINTS = 20000  # of those that the search for the table takes
 

@@ -199,14 +199,9 @@ class Tracer:
                     camera.width,
                     len(strip),
                     spp=paths,
-                    seed=_seed(seed, top, call),
+                    seed=(seed << 24) + (top << 11) + call,  # pictures of equal requests are equal
                     catcher_height=ground if camera.ground else None,
                 )
                 strip[..., :3] += paths * images["radiance"]
                 strip[..., 3] += paths * (images["alpha"] + images.get("shadow", 0.0))
         return True
-
-
-def _seed(number: int, top: int, call: int) -> int:
-    """The seed of a call of the tracer; pictures of equal requests are equal."""
-    return (number << 24) + (top << 11) + call

@@ -28,7 +28,7 @@ from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
 
 from splitnerf_tools.report.embedding import as_halves
-from splitnerf_tools.view.assets import Source, ViewedAssets, ViewedPhotos
+from splitnerf_tools.view.assets import ViewedAssets, ViewedPhotos
 from splitnerf_tools.view.events import EventStream
 from splitnerf_tools.view.final import Camera, Tracer
 
@@ -255,7 +255,10 @@ class Handler(BaseHTTPRequestHandler):
         )
 
     def _asset(self, rest: str) -> None:
-        source = self._source(rest)
+        number = self._number(rest)
+        if number >= len(self.server.shown.sources):
+            raise Refused(HTTPStatus.NOT_FOUND, "there is no such asset")
+        source = self.server.shown.sources[number]
         self._send(source.content, "model/gltf-binary")
         if self.server.live is not None:
             self.server.live.taken(source)
@@ -333,12 +336,6 @@ class Handler(BaseHTTPRequestHandler):
         if len(body) < int(length):
             raise Refused(HTTPStatus.BAD_REQUEST, "the request ended early")
         return body
-
-    def _source(self, text: str) -> Source:
-        number = self._number(text)
-        if number >= len(self.server.shown.sources):
-            raise Refused(HTTPStatus.NOT_FOUND, "there is no such asset")
-        return self.server.shown.sources[number]
 
     def _number(self, text: str) -> int:
         if not (text.isascii() and text.isdigit() and len(text) < 10):
