@@ -157,7 +157,10 @@ def keys(**content: object) -> Damage:
 
 NERFSTUDIO = {
     "mask of another size": (picture("masks/v03.png.png", SIZE, 8), "v03.png.png: is 8x48, its image v03.png is 48x48"),
-    "mask of another kind": (keys(mask_kind="depth"), "'mask_kind' must be one of auto, object, ignore"),
+    "mask of another kind": (
+        meta(lambda m: m["frames"][0].update(mask_kind=["depth"]), "transforms.json"),
+        "'mask_kind' must be one of auto, object, ignore",
+    ),
     "lens without a model": (keys(camera_model="FOV"), "transforms.json: camera model 'FOV' is not read; undistort"),
     "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
     "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),

@@ -37,6 +37,9 @@ def test_blender_layout(scene):
     focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
     assert data.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert np.array_equal(data.box_from_world, np.eye(4))
+    small = load_dataset(scene, "train", downscale=5)
+    assert small.images.shape[1:3] == (SIZE // 5, SIZE // 5)
+    assert small.intrinsics[0] * 5 == pytest.approx(data.intrinsics[0])
 
 
 def test_view_folders(tmp_path):
@@ -91,12 +94,6 @@ def test_radiance_a_little_below_0_is_noise(tmp_path):
     write_image(tmp_path / "a.exr", np.where(pixels < 0, 100 * pixels, pixels))
     with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
         load_photo(frame, 1, "object")
-
-
-def test_downscale_divides_size_and_intrinsics(scene):
-    data = load_dataset(scene, "train", downscale=5)
-    assert data.images.shape[1:3] == (SIZE // 5, SIZE // 5)
-    assert data.intrinsics[0] * 5 == pytest.approx(load_dataset(scene, "train").intrinsics[0])
 
 
 def test_far_small_object_is_brought_into_the_box(tmp_path):

@@ -55,9 +55,7 @@ def test_balanced_accuracy():
     # Recall 1 of metal, 3/4 of the rest; plain accuracy would be 4/5.
     assert metrics.balanced_accuracy(np.array([0.9, 0.9, 0.1, 0.1, 0.1]), truth) == pytest.approx(0.875)
     assert metrics.balanced_accuracy(np.array([0.1, 0.9]), np.array([0, 0])) == pytest.approx(0.5)
-
-
-def test_what_is_no_more_than_the_threshold_is_no_metal():
+    # What is no more than the threshold is no metal.
     assert metrics.balanced_accuracy(np.array([0.5, 0.6]), np.array([0.5, 0.6])) == 1.0
 
 

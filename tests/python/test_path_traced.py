@@ -81,16 +81,9 @@ def test_bounces_and_their_bound_are_as_asked():
     assert render(asset, light=40.0, spp=64)["radiance"].mean() == bright[10.0]
 
 
-@pytest.mark.parametrize(
-    "material, message",
-    [
-        (Material(normal_texture=np.full((2, 2, 3), np.nan, np.float32)), "normal textures must be finite"),
-        (Material(roughness_metallic_texture=np.zeros((2, 2, 3), np.float32)), "roughness_metallic_texture must be"),
-    ],
-)
-def test_unusable_materials_are_refused(material, message):
-    with pytest.raises(ValueError, match=message):
-        AssetRenderer(square(material))
+def test_a_texture_of_another_shape_is_refused():
+    with pytest.raises(ValueError, match="roughness_metallic_texture must be"):
+        AssetRenderer(square(Material(roughness_metallic_texture=np.zeros((2, 2, 3), np.float32))))
 
 
 @pytest.mark.skipif(not _core.embree_version(), reason="needs the build with Embree: rays one by one are too slow")

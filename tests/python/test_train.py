@@ -146,7 +146,6 @@ def test_a_deterministic_run_goes_on_where_it_began(data, tmp_path, monkeypatch)
         (["--resume", "--overwrite"], "exclude"),
         (["--resume"], "no checkpoint"),
         (["--max-minutes", "-1"], "max-minutes"),
-        (["--deterministic", "--max-minutes", "1"], "deterministic run ends by its steps"),
     ],
 )
 def test_bad_options_exit_with_2(data, tmp_path, capsys, options, word):
