@@ -16,6 +16,7 @@ from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGridSpec, MeshScene, fibonacci_directions
 from splitnerf.ops.light import light_filters, zonal_factors
 from splitnerf.ops.rays import CELL_OCCUPIED
+from splitnerf_tools.bench import subjects
 from torch.utils._pytree import tree_map
 
 # ---- the hash grid ----
@@ -57,13 +58,7 @@ LIGHT_ROUGHNESS = (0.0, 0.03, 0.1, 0.31, 0.43, 0.49, 0.55, 0.8, 0.97)
 
 def octahedral_directions(n: int) -> torch.Tensor:
     """[n^2, 3] unit float64 directions of the texel centres."""
-    centres = (torch.arange(n, dtype=torch.float64) + 0.5) * 2 / n - 1
-    y, x = torch.meshgrid(centres, centres, indexing="ij")
-    z = 1 - x.abs() - y.abs()
-    sign = lambda v: torch.where(v < 0, -1.0, 1.0).double()
-    below = z < 0
-    x, y = torch.where(below, (1 - y.abs()) * sign(x), x), torch.where(below, (1 - x.abs()) * sign(y), y)
-    return unit(torch.stack([x, y, z], -1).reshape(-1, 3))
+    return torch.from_numpy(subjects.octahedral_directions(n))
 
 
 def lookup_inputs(dtype=torch.float64, n: int = 18) -> tuple:

@@ -30,7 +30,7 @@ from splitnerf_tools.view.server import ViewServer
 from splitnerf_tools.view.training_asset import LINEAR, training_asset
 from splitnerf_tools.view.training_page import training_page
 from test_train import flat, same
-from tiny_runs import tiny
+from tiny_runs import lines_of, tiny
 from viewer_server import ask, error_of, halves, triangle
 
 CPU = torch.device("cpu")
@@ -157,8 +157,7 @@ def test_curves_hold_the_lines_of_the_log(data, tmp_path):
     live = Live("mine")
     (tmp_path / "mine").mkdir()
     Training(load_dataset(data), tiny(steps=24), tmp_path / "mine", CPU, live).complete()
-    written = [json.loads(line) for line in (tmp_path / "mine/metrics.jsonl").read_text().splitlines()]
-    lines = live.lines(0)
+    written, lines = lines_of(tmp_path / "mine"), live.lines(0)
     assert [line["step"] for line in lines] == [line["step"] for line in written]
     assert [line["psnr"] for line in lines] == pytest.approx([line["psnr"] for line in written], rel=1e-4)
     assert {name for name in written[0] if name.startswith("loss")} <= lines[0].keys()

@@ -11,7 +11,7 @@ import torch
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_image
 from splitnerf.errors import InputError
-from splitnerf.fields import EvaluatedLight
+from splitnerf.fields import EvaluatedLight, Light
 from splitnerf.pipeline import check_repeatable, load_run
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import OccupancyGrid, visual_hull
@@ -87,17 +87,8 @@ def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypat
 
 
 def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkeypatch):
-    at, heights = steps_of(monkeypatch), []
-    training = {}
-    train_init = loop.Training.__init__
-
-    def noted(self, *args, **named):
-        train_init(self, *args, **named)
-        training["it"] = self
-        panorama = self.model.light.panorama
-        self.model.light.panorama = lambda height: heights.append((at[0], height)) or panorama(height)
-
-    monkeypatch.setattr(loop.Training, "__init__", noted)
+    at = steps_of(monkeypatch)
+    heights = calls(monkeypatch, Light, "panorama", lambda _, height: (at[0], height))
     config = tiny(
         steps=20,
         mesh_every=0.2,
@@ -105,8 +96,8 @@ def test_the_light_that_weighs_the_rays_follows_the_light(data, tmp_path, monkey
         **{"occlusion.kind": "mlp", "shading.method": "split", "constants.occlusion_environment_height": 12},
         occlusion_rays=4,
     )
-    train_scene(load_dataset(data), config, tmp_path)
-    assert heights == [(4, 12), (16, 12)] and training["it"].mesh.environment.shape == (12, 24, 3)
+    trained = train_scene(load_dataset(data), config, tmp_path)
+    assert heights == [(4, 12), (16, 12)] and trained.mesh.environment.shape == (12, 24, 3)
 
 
 def test_all_that_a_run_draws_follows_its_seed(data, tmp_path):
@@ -155,10 +146,8 @@ def test_previews_of_large_photos_are_smaller_pictures_of_the_view(data, tmp_pat
 
 def test_previews_and_checkpoints_come_from_time_to_time(data, tmp_path, monkeypatch):
     """Previews with each quarter of the run; checkpoints after their minutes, but only when the light has moved."""
-    previews, saved = [], []
+    previews, saved = [], calls(monkeypatch, loop.Training, "save", lambda training: training.step)
     monkeypatch.setattr(loop, "write_preview", lambda *args: previews.append(args[-1]))
-    save = loop.Training.save
-    monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
     config = tiny(steps=20, checkpoint_minutes=1e-9, light_step_every=8, **PLAIN | {"preview_every": 0.25})
     train_scene(load_dataset(data), config, tmp_path)
     assert previews == [5, 10, 15, 20] and saved == [8, 16, 20]
@@ -215,10 +204,9 @@ def test_a_step_without_all_its_samples_leaves_nothing_behind(data, tmp_path, mo
 
 def test_time_is_counted_in_minutes_and_goes_on_with_the_run(data, tmp_path, monkeypatch):
     """Each step takes 10 seconds: checkpoints after more than a minute; a pause between two parts does not count."""
-    at, pause, saved = steps_of(monkeypatch), [0.0], []
+    at, pause = steps_of(monkeypatch), [0.0]
+    saved = calls(monkeypatch, loop.Training, "save", lambda training: training.step)
     monkeypatch.setattr(loop.time, "monotonic", lambda: 10.0 * (at[0] + 1) + pause[0])
-    save = loop.Training.save
-    monkeypatch.setattr(loop.Training, "save", lambda self: saved.append(self.step) or save(self))
     config = tiny(steps=16, checkpoint_minutes=1.0, light_step_every=1, **PLAIN)
     train_scene(load_dataset(data), config, tmp_path)
     assert saved == [7, 14, 16]
