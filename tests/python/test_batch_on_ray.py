@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -85,26 +86,23 @@ def call(tmp_path):
         started.kill()
 
 
+def processes(name: str) -> dict[int, str]:
+    """A file of /proc of all processes, by their number."""
+    found = {}
+    for path in Path("/proc").glob(f"[0-9]*/{name}"):
+        with suppress(OSError):
+            found[int(path.parent.name)] = path.read_text(errors="replace")
+    return found
+
+
 def commands() -> dict[int, str]:
     """The command lines of all processes, by their number."""
-    found = {}
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            found[int(path.parent.name)] = path.read_bytes().replace(b"\0", b" ").decode(errors="replace")
-        except OSError:
-            pass
-    return found
+    return {process: text.replace("\0", " ") for process, text in processes("cmdline").items()}
 
 
 def parents() -> dict[int, int]:
     """The parent of each process."""
-    found = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            found[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
-        except OSError:
-            pass
-    return found
+    return {process: int(text.rpartition(")")[2].split()[1]) for process, text in processes("stat").items()}
 
 
 def family(of: int) -> set[int]:
@@ -120,10 +118,8 @@ def listeners(processes: set[int]) -> set[str]:
     sockets = set()
     for process in processes:
         for handle in Path(f"/proc/{process}/fd").glob("*"):
-            try:
+            with suppress(OSError):
                 sockets.add(os.readlink(handle))
-            except OSError:
-                pass
     found = set()
     for table in ("/proc/net/tcp", "/proc/net/tcp6"):
         for line in Path(table).read_text().splitlines()[1:]:
@@ -136,22 +132,11 @@ def listeners(processes: set[int]) -> set[str]:
 LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
 
 
-def scenes_of(data: Path, folder: Path, *names: str) -> list[Path]:
-    """Copies of a data set."""
-    for name in names:
-        shutil.copytree(data, folder / name)
-    return [folder / name for name in names]
-
-
-def damage(scene: Path) -> None:
-    path = scene / "transforms_train.json"
-    path.write_text(path.read_text()[:100])
-
-
 def test_a_damaged_scene_stops_no_other_and_nobody_else_reaches_ray(data, tmp_path, call):
-    good, bad = scenes_of(data, tmp_path / "scenes", "good", "bad")
-    damage(bad)
-    out = tmp_path / "out"
+    good, bad, out = tmp_path / "good", tmp_path / "bad", tmp_path / "out"
+    for scene in (good, bad):
+        shutil.copytree(data, scene)
+    os.truncate(bad / "transforms_train.json", 100)
     first = call(good, bad, "--out", out, "--steps", 4, "--cores-per-scene", "0.5")
     seen = first.wait_until(lambda: listeners(family(first.program.pid)))
     while first.program.poll() is None:

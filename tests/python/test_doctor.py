@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 import torch
-from op_checks import has_cuda_kernel
+from op_cases import ON_THE_CPU_ALONE
 from pretend_gpu import pretend_gpu
 from splitnerf import _core, devices
 from splitnerf.cli import main
@@ -60,6 +60,7 @@ def test_every_operator_is_asked():
         assert self_test.failures("cpu") == []
     assert sorted(mode.reached) == OPERATORS
     assert self_test.operators("cpu") == [name for name in OPERATORS if "_backward" not in name]
+    assert self_test.CPU_ALONE == set(ON_THE_CPU_ALONE)
 
 
 def test_the_answers_are_those_of_this_version(tmp_path):
@@ -71,13 +72,6 @@ def test_the_answers_are_those_of_this_version(tmp_path):
         for result, pair in known.items() if name not in self_test.CPU_ALONE else ():
             # Processors round differently: with AVX2 alone a roughness's gradient is 4e-7 of its size off.
             assert now[name][result] == pytest.approx(pair, rel=1e-6, abs=1e-6 * pair[1]), (name, result)
-
-
-def test_what_is_traced_stays_on_the_cpu():
-    if not _core.cuda_architectures():
-        pytest.skip("build without CUDA")
-    assert {name for name in OPERATORS if not has_cuda_kernel(name)} == self_test.CPU_ALONE
-    assert set(self_test.operators("cuda")) == set(self_test.operators("cpu")) - self_test.CPU_ALONE
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -197,12 +191,25 @@ def test_which_gpus_kernels_run_on(architectures, covered, others):
     assert not any(devices.covers(architectures, *capability) for capability in others)
 
 
-def test_gpus(monkeypatch):
+@pytest.fixture
+def gpu(monkeypatch):
+    """A machine with a GPU that is right; the changes of the arguments make it otherwise."""
+
+    def make(built="90-real", there=True, capability=(9, 0), failed=()):
+        monkeypatch.setattr(_core, "cuda_architectures", lambda: built)
+        monkeypatch.setattr(torch.cuda, "is_available", lambda: there)
+        monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: capability)
+        monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Big GPU")
+        monkeypatch.setattr(torch.cuda, "current_device", lambda: 0)
+        tested = [self_test.Failure(name, "cuda", "found 1, expected 2", "it") for name in failed]
+        monkeypatch.setattr(self_test, "failures", lambda device: tested if device == "cuda" else None)
+
+    return make
+
+
+def test_gpus(gpu, monkeypatch):
     """A GPU with and without kernels for it, none, and one that torch does not see."""
-    monkeypatch.setattr(_core, "cuda_architectures", lambda: "90-real")
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: (9, 0))
-    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Big GPU")
+    gpu()
     found = machine.cuda()
     assert "kernels for 90-real" in found.value and "Big GPU" in found.value and not found.advice and not found.failed
     assert devices.devices() == ["cpu", "cuda"]
@@ -242,21 +249,6 @@ def test_one_processor(monkeypatch, tmp_path, capsys):
 
 class TestChoice:
     """--device auto: a GPU that passed every operator's test, else the CPU; why is said."""
-
-    @pytest.fixture
-    def gpu(self, monkeypatch):
-        """A machine with a GPU that is right; the changes of the arguments make it otherwise."""
-
-        def make(built="90-real", there=True, capability=(9, 0), failed=()):
-            monkeypatch.setattr(_core, "cuda_architectures", lambda: built)
-            monkeypatch.setattr(torch.cuda, "is_available", lambda: there)
-            monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: capability)
-            monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Big GPU")
-            monkeypatch.setattr(torch.cuda, "current_device", lambda: 0)
-            tested = [self_test.Failure(name, "cuda", "found 1, expected 2", "it") for name in failed]
-            monkeypatch.setattr(self_test, "failures", lambda device: tested if device == "cuda" else None)
-
-        return make
 
     def test_a_gpu_that_passes_is_taken(self, gpu):
         gpu()
