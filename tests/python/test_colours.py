@@ -16,10 +16,6 @@ from splitnerf.relight.background import read_plate
 from splitnerf_tools.capture.photographs import find_photographs, read_upright
 
 
-def png(pixels: np.ndarray) -> Image.Image:
-    return Image.fromarray(pixels)
-
-
 def wide_profile(name: str = "wide") -> bytes:
     """An ICC profile with sRGB's curve, whose red is that of Display P3 (tag values: CSS Color 4, adapted to D50)."""
     srgb = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
@@ -125,7 +121,7 @@ def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
 @pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
 def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
     (tmp_path / "x.png").write_bytes(
-        with_chunk(png(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
+        with_chunk(Image.fromarray(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
     )
     expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
     assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
@@ -140,7 +136,7 @@ FROM_ADOBE = np.array([[1.3983, -0.3983, 0], [0, 1, 0], [0, -0.0429, 1.0429]])
 @pytest.mark.parametrize("stated", ["EXIF", "cHRM", "cICP"])
 def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, stated):
     """Adobe RGB as cameras state it and as a PNG's chunks do; Display P3 by its code."""
-    colour, image = np.float32([180, 100, 60]), png(np.full((4, 4, 3), (180, 100, 60), np.uint8))
+    colour, image = np.float32([180, 100, 60]), Image.fromarray(np.full((4, 4, 3), (180, 100, 60), np.uint8))
     path = tmp_path / ("x.jpg" if stated == "EXIF" else "x.png")
     if stated == "EXIF":
         exif = Image.Exif()
@@ -202,7 +198,7 @@ def test_the_gain_map_of_a_phone_is_not_applied(tmp_path, capsys):
 
 def test_a_damaged_statement_of_colours_is_said(tmp_path, capsys):
     """A gamma with a wrong checksum, for which Pillow does not open the file."""
-    data = bytearray(with_chunk(png(np.full((4, 4, 3), 9, np.uint8)), b"gAMA", struct.pack(">I", 100000)))
+    data = bytearray(with_chunk(Image.fromarray(np.full((4, 4, 3), 9, np.uint8)), b"gAMA", struct.pack(">I", 100000)))
     data[data.index(b"gAMA") + 8] ^= 255
     (tmp_path / "x.png").write_bytes(data)
     assert (read_colours(tmp_path / "x.png") == 9).all()
@@ -213,15 +209,17 @@ def test_an_unknown_colour_space_and_an_alpha_are_said(tmp_path, capsys):
     """As cameras say that they are set to another space without a name; a curve for bright screens; of cut-outs."""
     exif = Image.Exif()
     exif.get_ifd(34665)[40961] = 65535
-    png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
-    (tmp_path / "x.png").write_bytes(with_chunk(png(np.zeros((4, 4, 3), np.uint8)), b"cICP", bytes((9, 16, 0, 1))))
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
+    (tmp_path / "x.png").write_bytes(
+        with_chunk(Image.fromarray(np.zeros((4, 4, 3), np.uint8)), b"cICP", bytes((9, 16, 0, 1)))
+    )
     for file, read in (("x.jpg", read_colours), ("x.jpg", read_upright), ("x.png", read_colours)):
         errors._said.clear()
         read(tmp_path / file)
         assert "state that their colours are not sRGB, and not what they are" in capsys.readouterr().err
     no_light = struct.pack(">8I", 31270, 32900, 64000, 0, 64000, 0, 15000, 6000)
-    (tmp_path / "z.png").write_bytes(with_chunk(png(np.full((4, 4, 3), 9, np.uint8)), b"cHRM", no_light))
+    (tmp_path / "z.png").write_bytes(with_chunk(Image.fromarray(np.full((4, 4, 3), 9, np.uint8)), b"cHRM", no_light))
     assert (read_colours(tmp_path / "z.png") == 9).all() and "primaries that are none" in capsys.readouterr().err
-    png(np.zeros((4, 4, 4), np.uint8)).save(tmp_path / "y.png")
+    Image.fromarray(np.zeros((4, 4, 4), np.uint8)).save(tmp_path / "y.png")
     read_upright(tmp_path / "y.png")
     assert "the alpha of photos is not used; give --masks if it is the object's (y.png)" in capsys.readouterr().err

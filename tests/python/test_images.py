@@ -5,9 +5,8 @@ import subprocess
 import sys
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
-from blender_data import directions_of_map
+from blender_data import directions_of_map, write_exr
 from PIL import Image
 from splitnerf import _core
 from splitnerf.data import images
@@ -95,15 +94,6 @@ def test_a_black_mask_of_one_bit_a_pixel_is_as_small_as_that(tmp_path):
     assert images.read_image(tmp_path / "mask.png").shape == (2000, 2000, 1)
 
 
-def write_raw(path, pixels):
-    """Writes floats as they are, NaN and negative ones too."""
-    sink = oiio.ImageOutput.create(str(path))
-    sink.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, oiio.FLOAT))
-    sink.write_image(np.ascontiguousarray(pixels, np.float32))
-    sink.close()
-    return path
-
-
 def test_texels_are_met_at_their_directions_and_blend_between(tmp_path):
     radiance = np.random.default_rng(0).random((8, 16, 3), np.float32)
     write_image(tmp_path / "a.exr", radiance)
@@ -144,9 +134,9 @@ def test_a_turn_between_columns_keeps_each_row_and_moves_smoothly():
 
 
 def test_slightly_negative_pixels_are_set_to_zero_and_said(tmp_path, capsys):
-    radiance = np.ones((4, 8, 3))
+    radiance = np.ones((4, 8, 3), np.float32)
     radiance[1, 2] = -1e-3
-    read = read_environment(write_raw(tmp_path / "a.exr", radiance))
+    read = read_environment(write_exr(tmp_path / "a.exr", radiance))
     assert np.array_equal(read, np.maximum(radiance, 0))
     assert "a.exr: 1 pixels were slightly negative; set to 0" in capsys.readouterr().err
 

@@ -117,9 +117,9 @@ def test_copies_of_photos_and_of_poses_are_told_apart(tmp_path):
     photos = Photos()
     photos.alphas[3], photos.poses[20] = photos.alphas[2], photos.poses[19]
     photos.alphas[11], photos.poses[11] = photos.alphas[10], photos.poses[10]
-    found = suspects(photos.inspected(tmp_path))["duplicate photos"]
-    reasons = line(photos.inspected(tmp_path), "duplicate photos").suspects
-    assert found == [2, 3, 10, 11, 19, 20]
+    inspected = photos.inspected(tmp_path)
+    reasons = line(inspected, "duplicate photos").suspects
+    assert suspects(inspected)["duplicate photos"] == [2, 3, 10, 11, 19, 20]
     assert reasons[2] == "one photo, two poses: 03.png"
     assert reasons[11] == "one photo twice: 10.png"
     assert reasons[19] == "two photos, one pose: 20.png"

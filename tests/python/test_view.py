@@ -21,6 +21,7 @@ from urllib.parse import quote, urlsplit
 import numpy as np
 import pytest
 import splitnerf_tools.view
+from blender_data import edit
 from gltf_builder import beside
 from splitnerf.cli import DONE, main
 from splitnerf.data.environment import rotate_environment
@@ -230,12 +231,8 @@ def test_large_photos_are_averaged_down_and_masks_hide_nothing(shown_run, data, 
     with serving(shown_run, photos=ViewedPhotos(data)) as server:
         assert decode_image(ask(server, "photos/0")[2], "photo").shape == (8, 8, 4)
     shutil.copytree(data, tmp_path / "data")
-    for path in (tmp_path / "data").rglob("transforms*.json"):
-        content = json.loads(path.read_text())
-        for frame in content["frames"]:
-            frame["mask_path"] = "none.png"
-        write_image(path.parent / "none.png", np.zeros((24, 24), np.float32))
-        path.write_text(json.dumps(content))
+    edit(tmp_path / "data", lambda meta: [frame.update(mask_path="none.png") for frame in meta["frames"]])
+    write_image(tmp_path / "data/none.png", np.zeros((24, 24), np.float32))
     photo = read_frames(tmp_path / "data", "train")[0][0].image_path
     write_image(photo, np.full((24, 24, 3), 0.5, np.float32))
     monkeypatch.undo()
