@@ -323,6 +323,7 @@ ON_THE_CPU_ALONE = {
     "vertex_grids": lambda _: (corners(grid_mesh(2.0, 5))[0], 0.4, 3),
 }
 EVERY = CASES | ON_THE_CPU_ALONE
+OPERATORS = {*EVERY, "adamw_steps_"}  # the last one has no outputs: see test_ops_adamw.py
 
 # Which samples there are depends on roundings: the truth is the CPU's own in the same dtype.
 ROUNDED_ALIKE = {"march_rays", "spread_samples", "sample_rays"}

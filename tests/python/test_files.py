@@ -20,6 +20,7 @@ from splitnerf import files
 from splitnerf.data.images import read_image, write_image
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, PARTIAL, atomic_path, locked
+from splitnerf_tools.capture.photographs import write_png
 
 HOLDS = """
 import sys, time
@@ -81,13 +82,9 @@ def test_an_error_names_the_file_and_its_cause_and_keeps_the_old_one(tmp_path, m
     def fails(*arguments, **options):
         raise OSError(number, os.strerror(number), str(tmp_path / ".a.xyz.glb"))
 
-    for place, (module, name) in {
-        "making it": (tempfile, "mkstemp"),
-        "to the disk": (os, "fsync"),
-        "taking the name": (os, "replace"),
-    }.items():
-        if where == place:
-            monkeypatch.setattr(module, name, fails)
+    places = {"making it": (tempfile, "mkstemp"), "to the disk": (os, "fsync"), "taking the name": (os, "replace")}
+    if where in places:
+        monkeypatch.setattr(*places[where], fails)
     with pytest.raises(OSError) as caught, atomic_path(path) as temporary:
         temporary.write_text("new")
         if where == "in the block":
@@ -96,13 +93,13 @@ def test_an_error_names_the_file_and_its_cause_and_keeps_the_old_one(tmp_path, m
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("suffix", [".png", ".jpg", ".exr", ".hdr"])
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".exr", ".hdr", "of a video"])
 def test_an_image_without_room_is_an_error_and_keeps_the_old_one(tmp_path, suffix):
     pixels = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
-    path = tmp_path / f"a{suffix}"
+    path = tmp_path / ("a.png" if suffix == "of a video" else f"a{suffix}")
     path.write_text("old")
-    with no_more_than(700), pytest.raises(OSError, match=f"a{suffix}: "):
-        write_image(path, pixels)
+    with no_more_than(700), pytest.raises(OSError, match=f"{path.name}: cannot be written "):
+        write_png(path, np.uint8(255 * pixels)) if suffix == "of a video" else write_image(path, pixels)
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 

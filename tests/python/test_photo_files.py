@@ -3,6 +3,8 @@
 import io
 import subprocess
 import sys
+from collections.abc import Iterable
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -11,17 +13,16 @@ import numpy as np
 import pytest
 from PIL import Image
 from splitnerf.errors import InputError
-from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_frames, write_png
+from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_frames
 from table_scene import photograph, ring
-from test_files import no_more_than
 
 
-def test_a_frame_without_room_is_an_error(tmp_path):
-    """And an image or mask, which one function writes."""
-    (tmp_path / "a.png").write_text("old")
-    with no_more_than(700), pytest.raises(OSError, match="a.png: cannot be written .File too large."):
-        write_png(tmp_path / "a.png", np.random.default_rng(0).integers(0, 255, (90, 90, 3), np.uint8))
-    assert (tmp_path / "a.png").read_text() == "old" and len(list(tmp_path.iterdir())) == 1
+def write_video(path: Path, frames: Iterable[np.ndarray], code: str = "MJPG") -> None:
+    """Frames of 320 x 240 pixels."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), 10, (320, 240))
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
 
 
 def test_files_tell_of_turns_and_exposures(tmp_path):
@@ -109,12 +110,9 @@ def test_libraries_say_nothing_beside_the_program(tmp_path, name, told):
 
 
 def test_the_sharpest_frames_of_a_video(tmp_path):
-    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (320, 240))
     sharp = photograph(ring(3)[0], 320.0, 320, 240)[0]
     blurred = cv2.GaussianBlur(sharp, (15, 15), 4)
-    for number in range(12):
-        writer.write(sharp if number in (2, 5, 9) else blurred)
-    writer.release()
+    write_video(tmp_path / "v.avi", (sharp if number in (2, 5, 9) else blurred for number in range(12)))
     (tmp_path / "frames").mkdir()
     write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, lambda share: None)
     frames = sorted((tmp_path / "frames").iterdir())
@@ -125,19 +123,14 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
 @pytest.mark.parametrize(("box", "is_told"), [(b"colrnclx\0\x09\0\x12", 1), (b"colrnclc\0\x01\0\x01", 0)])
 def test_a_video_of_high_range_is_told_of(tmp_path, capsys, box, is_told):
     """As phones film by default, in hybrid log-gamma."""
-    writer = cv2.VideoWriter(str(tmp_path / "v.mp4"), cv2.VideoWriter_fourcc(*"mp4v"), 10, (320, 240))
-    writer.write(np.full((240, 320, 3), 20, np.uint8))
-    writer.release()
+    write_video(tmp_path / "v.mp4", [np.full((240, 320, 3), 20, np.uint8)], "mp4v")
     (tmp_path / "v.mp4").write_bytes((tmp_path / "v.mp4").read_bytes() + b"\0\0\0\x13" + box + b"\0\x09\0")
     write_frames(tmp_path / "v.mp4", tmp_path, 1, lambda share: None)
     assert ("v.mp4: is a video of high dynamic range" in capsys.readouterr().err) == is_told
 
 
 def test_a_video_that_is_cut_short_is_told_of(tmp_path, capsys):
-    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (320, 240))
-    for number in range(12):
-        writer.write(np.full((240, 320, 3), 20 * number, np.uint8))
-    writer.release()
+    write_video(tmp_path / "v.avi", (np.full((240, 320, 3), 20 * number, np.uint8) for number in range(12)))
     data = bytearray((tmp_path / "v.avi").read_bytes())
     start = [i for i in range(len(data)) if data[i : i + 4] == b"00dc"][7]
     data[start : data.index(b"idx1")] = bytes(data.index(b"idx1") - start)
