@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
@@ -179,15 +180,11 @@ def beyond(truth: Answer, on_cpu: Answer, there: Answer, more: float = 0.0) -> s
 @pytest.fixture(scope="module")
 def side(data, tmp_path_factory) -> Side:
     """A training of six steps with a mesh, in a checkpoint."""
-
-    class Silence:
-        show = staticmethod(lambda *_: None)
-
     made = Side(load_dataset(data), CONFIG, tmp_path_factory.mktemp("step"))
     training = Training(*made, torch.device("cpu"))
     while training.step < 6 or not training.may_stop:  # gradients of the light are pending
         training.refresh()
-        training.advance(Silence())
+        training.advance(SimpleNamespace(show=lambda *_: None))
     for _ in range(2):
         training.mesh.poll(wait=True)
         training.mesh.request(training.progress)

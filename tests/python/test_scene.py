@@ -2,13 +2,12 @@
 
 import math
 
-import numpy as np
 import pytest
 import torch
-from blender_data import look_at
 from splitnerf.config import preset
 from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
+from splitnerf_tools.synth.orbits import orbit
 
 RADIUS = 0.7
 
@@ -85,21 +84,15 @@ class TestAveragedGrid:
             assert grid.cells.shape == (12, 12, 12) and (grid.cells == CELL_OCCUPIED).all()
 
 
-def orbit(n: int, distance: float = 4.0) -> torch.Tensor:
-    """Cameras around the z axis that look at the origin."""
-    angles = 2 * math.pi * np.arange(n) / n
-    places = distance * np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
-    return torch.from_numpy(np.stack([look_at(place, np.zeros(3)) for place in places])).float()
-
-
 class TestHull:
     def test_one_mask_of_many_that_is_cut_short_does_not_cut_the_hull(self):
         size, focal, distance = 80, 50.0, 4.0
         y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
         disc = ((x - 40) ** 2 + (y - 40) ** 2) < (focal * RADIUS / math.sqrt(distance**2 - RADIUS**2)) ** 2
         lenses = torch.tensor([[focal, focal, 40.0, 40.0]] * 40)
+        poses = torch.from_numpy(orbit(40, distance, elevation=0.0)).float()
         inside = (OccupancyGrid(32, 1.5).centres().norm(dim=1) < RADIUS).view(32, 32, 32)
         for n_cut, whole in ((1, True), (4, False)):
             masks = disc.float().expand(40, -1, -1).clone()
             masks[:n_cut] *= y < 40
-            assert bool(visual_hull(32, 1.5, masks, orbit(40), lenses)[inside].all()) == whole
+            assert bool(visual_hull(32, 1.5, masks, poses, lenses)[inside].all()) == whole

@@ -106,11 +106,8 @@ def ball_on_floor(
     on_ball, on_floor = (origins + t[..., None] * rays for t in (t_ball, t_floor))
     ground = np.where(rays[..., 2:] < 0, pattern(on_floor[..., :2], [0.2, 0.7, 0.3]), [0.5, 0.6, 0.9])
     hit = (inside > 0) & (t_ball > 0)
-    return (
-        np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground),
-        np.where(hit, t_ball, t_floor),
-        hit,
-    )
+    colours = np.where(hit[..., None], pattern(on_ball - CENTRE, [0.9, 0.3, 0.2]), ground)
+    return colours, np.where(hit, t_ball, t_floor), hit
 
 
 def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False) -> list[np.ndarray]:
@@ -449,6 +446,12 @@ class TestOutline:
 
 
 class TestMirrors:
+    def rays(self, width: float, top: float, bottom: float, n: int) -> tuple[torch.Tensor, torch.Tensor]:
+        """Along x, of n rows and columns."""
+        y, z = torch.meshgrid(torch.linspace(-width, width, n), torch.linspace(top, bottom, n), indexing="xy")
+        o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
+        return o, torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3)
+
     def region(self, table: Table | None = None) -> Region:
         """A slab of solid cells at x = 0, |y| < 0.8, 0.2 < z < 0.9."""
         centres = ((np.indices((CELLS,) * 3) + 0.5) * (2 / CELLS) - 1) * 1.6
@@ -464,11 +467,10 @@ class TestMirrors:
     def test_a_mask_gets_what_is_solid_but_no_rims(self):
         """Seen along x: the right half of the slab is missing from the mask, and a rim of four pixels on the left."""
         n = 80
-        y, z = torch.meshgrid(torch.linspace(-1, 1, n // 2), torch.linspace(1.2, 0, n // 2), indexing="xy")
-        o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
+        o, d = self.rays(1.0, 1.2, 0.0, n // 2)
         mask = torch.zeros(n, n)
         mask[22:64, 12:40] = 1
-        found = with_mirrors(mask, self.region(), (n // 2, n // 2), o, torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3))
+        found = with_mirrors(mask, self.region(), (n // 2, n // 2), o, d)
         assert found[30:60, 42:68].min() == 1 and torch.equal(found[:, :12], mask[:, :12]) and found[:, 76:].max() == 0
         assert torch.equal(with_mirrors(mask, Region(np.zeros((CELLS,) * 3, bool), None), (n // 2, n // 2), o, o), mask)
 
@@ -477,9 +479,7 @@ class TestMirrors:
         n, solid = 320, self.region().solid.numpy().copy()
         solid[:, abs(((np.arange(CELLS) + 0.5) * (2 / CELLS) - 1) * 1.6) > 0.2] = False
         solid[CELLS // 2, CELLS // 2 + 9, CELLS // 2 + 15] = True
-        y, z = torch.meshgrid(torch.linspace(-0.35, 0.35, n // 2), torch.linspace(0.8, 0.3, n // 2), indexing="xy")
-        o = torch.stack([torch.full_like(y, 3.0), y, z], -1).reshape(-1, 3)
-        region, d = Region(solid, None, None, solid), torch.tensor([[-1.0, 0, 0]]).expand(len(o), 3)
+        region, (o, d) = Region(solid, None, None, solid), self.rays(0.35, 0.8, 0.3, n // 2)
         assert 7 < region.cell_pixels((n // 2, n // 2), o, d) < 8
         seen = region.blocks(o, d).view(n // 2, n // 2)
         found = with_mirrors(torch.zeros(n, n), region, (n // 2, n // 2), o, d)

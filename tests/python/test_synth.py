@@ -294,15 +294,8 @@ def test_the_pattern_has_contrast_at_every_scale_and_no_jumps():
     assert np.abs(pattern(p + (0.002, 0, 0)) - colours).max() < 0.05
 
 
-@pytest.fixture(scope="module")
-def light(tmp_path_factory):
-    path = tmp_path_factory.mktemp("light") / "light.exr"
-    write_image(path, np.full((8, 16, 3), 0.7, np.float32))
-    return path
-
-
-def test_the_command_renders_a_shape_with_its_truth(light, tmp_path):
-    words = f"synth --shape mug --material glossy --light {light} --out {tmp_path / 'data'}"
+def test_the_command_renders_a_shape_with_its_truth(files, tmp_path):
+    words = f"synth --shape mug --material glossy --light {files / 'blue.exr'} --out {tmp_path / 'data'}"
     assert main([*words.split(), *"--size 24 --train 2 --test 1 --spp 16".split()]) == DONE
     truth = load_view_truths(load_dataset(tmp_path / "data", "test"))[0]
     solid = truth.normal_mask

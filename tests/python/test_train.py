@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import signal
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -173,9 +174,9 @@ CPU = torch.device("cpu")
 
 
 class Asking:
-    """Requests one thing after the other, from a step on; and writes down what it learns."""
+    """Requests one thing after the other, or calls it, from a step on; and writes down what it learns."""
 
-    def __init__(self, at: int = 0, *requests: Request | None):
+    def __init__(self, at: int = 0, *requests: Request | Callable | None):
         self.at, self.requests, self.heard, self.logged = at, list(requests), [], lambda line: None
 
     def __call__(self, event):
@@ -187,8 +188,9 @@ class Asking:
             self.heard.append((kind, training.step, path.is_file()))
         elif training is not None:
             self.heard.append((kind, training.step))
-            if kind == "step":
-                return self.requests.pop(0) if training.step >= self.at and self.requests else None
+            if kind == "step" and training.step >= self.at and self.requests:
+                request = self.requests.pop(0)
+                return request() if callable(request) else request
         else:
             self.heard.append((kind, None if path is None else (path / "mesh.glb").is_file()))
 
@@ -244,17 +246,9 @@ def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):
 @pytest.mark.parametrize("ends", [Request.STOP, signal.SIGINT, signal.SIGTERM])
 def test_the_last_step_of_a_stopped_run_is_logged(data, tmp_path, ends):
     """Also between two of the steps that are logged by their number; and once, where the run goes on from there."""
-
-    def ending(event):
-        if event.kind != "step" or event.training.step < 24:
-            return None
-        if ends is Request.STOP:
-            return ends
-        signal.raise_signal(ends)
-        return None
-
+    ending = ends if ends is Request.STOP else lambda: signal.raise_signal(ends)
     config = tiny(steps=40)
-    scene = train_scene(load_dataset(data), config, tmp_path, ending)
+    scene = train_scene(load_dataset(data), config, tmp_path, Asking(24, ending))
     assert scene.step == 24 and [line["step"] for line in lines_of(tmp_path)] == [*range(1, 21), 24]
     training = Training(load_dataset(data), config, tmp_path, CPU)
     training.restore()
