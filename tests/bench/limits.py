@@ -123,11 +123,8 @@ class Scene:
         relit = relight(renderer, self.views, self.maps, self.spp)
         relit_part = relit and relight_scores(relit)
         again = relit and relight(Reseeded(renderer), self.views, self.maps, max(1, self.spp // 2))
-        seen = {
-            name: asset_predictions(renderer, self.views, light, self.spp)
-            for name, light in self.lights.items()
-            if light is not None
-        }
+        lights = {name: light for name, light in self.lights.items() if light is not None}
+        seen = {name: asset_predictions(renderer, self.views, light, self.spp) for name, light in lights.items()}
         predictions = seen["novel_true"]
         errors = evaluate_maps(predictions, self.views, self.truths)
         pairs = [

@@ -168,12 +168,9 @@ def masks(func, args: tuple) -> bool:
     if name not in ("__getitem__", "__setitem__") or not isinstance(args[0], GpuTensor):
         return False
     index = args[1] if isinstance(args[1], tuple) else (args[1],)
+    by_list = any(isinstance(part, list) for part in index)
     by_mask = any(isinstance(part, Tensor) and part.dtype in (torch.bool, torch.uint8) for part in index)
-    return (
-        any(isinstance(part, list) for part in index)
-        or by_mask
-        and (name == "__getitem__" or isinstance(args[2], Tensor))
-    )
+    return by_list or by_mask and (name == "__getitem__" or isinstance(args[2], Tensor))
 
 
 def comes_from_cpu(func, args: tuple) -> bool:

@@ -93,10 +93,8 @@ def test_tables_hold_what_is_known():
     assert rows[0]["relight"] == "30.0" and rows[1]["relight"] == "" and rows[0]["metallic"] == ""
     assert rows[0]["minutes"] == "6.0" and rows[0]["normals"] == "5.0" and rows[0]["reference"] == FULL
     text = markdown_table([score(FULL, 0, 30.0), score(FULL, 1, 31.0), score("b", 0, 29.0)])
-    assert (
-        "| full | 30.50 | 0.9100 | 20.00 | 30.00 | 5.00 | 0.100 | 15.00 | 6.0 | 2 |" in text and "| b | 29.00 |" in text
-    )
-    assert "| -1.00 dB | full |" in text and "LPIPS" not in text and "Mean" not in text
+    assert "| full | 30.50 | 0.9100 | 20.00 | 30.00 | 5.00 | 0.100 | 15.00 | 6.0 | 2 |" in text
+    assert "| b | 29.00 |" in text and "| -1.00 dB | full |" in text and "LPIPS" not in text and "Mean" not in text
 
 
 def test_the_mean_over_scenes_is_that_of_rows_and_scores_that_all_have():
@@ -126,8 +124,7 @@ def test_it_runs_and_goes_on(data, tmp_path, capsys):
     assert all(np.isfinite(float(r["novel_view"])) for r in rows)
     capsys.readouterr()
     assert "other settings" in refused(capsys, *command, "--set", "mask_weight=0.5")
-    assert "none: no such folder" in refused(
-        capsys, command[0], str(tmp_path / "none"), *command[1:]
-    )  # before it trains
+    # Before it trains.
+    assert "none: no such folder" in refused(capsys, command[0], tmp_path / "none", *command[1:])
     assert main(["ablate", "--list"]) == DONE
     assert "no metal regulariser: losses.metal_weight = 0.0" in capsys.readouterr().out

@@ -90,11 +90,8 @@ def test_commands_hold_no_path_of_the_machine(monkeypatch):
 
 def test_a_page_says_which_library_was_missing(tmp_path, monkeypatch):
     result = Result("work", "Work", ("cpp",), ["b is twice as fast"])
-    monkeypatch.setattr(
-        harness.importlib,
-        "import_module",
-        lambda _: SimpleNamespace(run=lambda *_: (leave_out("c is left out"), result)[1]),
-    )
+    work = SimpleNamespace(run=lambda *_: (leave_out("c is left out"), result)[1])
+    monkeypatch.setattr(harness.importlib, "import_module", lambda _: work)
     for _ in range(2):  # its own page is replaced
         harness.run_benchmarks(["work"], True, tmp_path, print)
     assert "- b is twice as fast\n- c is left out\n" in (tmp_path / "work.md").read_text() and not LEFT_OUT

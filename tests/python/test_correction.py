@@ -108,21 +108,16 @@ def test_what_the_sum_adds_goes_to_the_rays_of_its_samples(monkeypatch):
     model, cells = ball()
     model.config = model.config.replace({"shading.method": "summed"})
     model.has_mesh = True
-    rays = (
-        torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]]),
-        torch.tensor([[-1.0, 0, 0]] * 3),
-        torch.full((3,), 0.5),
-    )
-    asked = {}
+    origins = torch.tensor([[4.0, 0.3, 0], [4.0, 5.0, 0], [4.0, -0.2, 0.2]])
+    rays = origins, torch.tensor([[-1.0, 0, 0]] * 3), torch.full((3,), 0.5)
+    asked, nothing = {}, (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3))
 
     def added(light, views, points, candidates, *_):
         asked.update(on_surface=points.on_surface, candidates=candidates)
         return candidates, torch.tensor([[1.0] * 3, [3.0] * 3])
 
     light, found = model.evaluate_light(), find_samples(model, cells, *rays)
-    monkeypatch.setattr(
-        model, "quadrature_correction", lambda *args: (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3))
-    )
+    monkeypatch.setattr(model, "quadrature_correction", lambda *args: nothing)
     without = render_rays(model, light, found, shades_per_ray=2).mean
     monkeypatch.setattr(model, "quadrature_correction", added)
     ray = render_rays(model, light, found, shades_per_ray=2)

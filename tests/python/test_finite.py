@@ -96,10 +96,8 @@ def test_a_step_without_a_finite_gradient_is_skipped_and_counted(data, tmp_path,
     assert all(p.isfinite().all() for p in trained.model.parameters())
     assert [line["skipped"] for line in lines_of(tmp_path)] == [0, 0, 0, 1, 1, 2, 3, 3]
     assert capsys.readouterr().err.count("step is skipped") == 3
-    counts = {
-        int(moments["step"]) for moments in load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()
-    }
-    assert max(counts) == 5
+    moments = load_checkpoint(tmp_path / "checkpoint.pt")["optimiser"]["state"].values()
+    assert max(int(of_one["step"]) for of_one in moments) == 5
 
 
 def step_of(*gradients: list[float] | None) -> Step:
@@ -113,11 +111,8 @@ def step_of(*gradients: list[float] | None) -> Step:
 def numbers_of(step: Step) -> StepNumbers:
     """The numbers of a step without terms and samples."""
     none = torch.zeros(0, dtype=torch.int64)
-    ray = SimpleNamespace(
-        found=SimpleNamespace(n_found=none.sum(), evaluated=none),
-        sizes=torch.zeros(3, dtype=torch.int64),
-        s=torch.ones(()),
-    )
+    found = SimpleNamespace(n_found=none.sum(), evaluated=none)
+    ray = SimpleNamespace(found=found, sizes=torch.zeros(3, dtype=torch.int64), s=torch.ones(()))
     return step.fetch(1, SimpleNamespace(target=none), ray, {}).read()
 
 

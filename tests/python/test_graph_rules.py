@@ -68,15 +68,7 @@ class Fake(GpuStep):
         self.last = StepNumbers(1, 5, {}, {}, 0.0, Capacity(self.n_found, *counts), 20.0, 0.0)
         return self.capacity.holds(self.last.counts)
 
-    def taken(
-        self,
-        n_rays: int = 5,
-        step: int = 0,
-        progress: float = 0.0,
-        counts: tuple | None = COUNTS,
-        light=None,
-        target=1.0,
-    ):
+    def taken(self, n_rays=5, step=0, progress=0.0, counts: tuple | None = COUNTS, light=None, target=1.0):
         """One step and its counts; returns what it gave, how it was taken, and whether it was complete."""
         before, known = len(self.calls), list(self._graphs.values())
         light = self.model.evaluate_light() if light is None else light
@@ -155,9 +147,8 @@ def decide(step: Fake, what: str) -> dict:
         step.model.has_mesh = True
     elif what == "held":
         step.is_held = lambda progress: True
-    return {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}.get(
-        what, {}
-    )
+    settings = {"light": {"step": LIGHT_PERIOD - 1}, "priors": {"progress": PRIORS_FROM}, "rays": {"n_rays": 6}}
+    return settings.get(what, {})
 
 
 @pytest.mark.parametrize("what", ["levels", "mesh", "occlusion", "held", "light", "priors", "rays"])
@@ -170,9 +161,8 @@ def test_another_decision_is_another_graph(step, what):
 def test_steps_that_decide_alike_share_a_graph(step):
     """The light moves with the 4th, the 8th and the last step, for which it stands for 4, 4 and one steps."""
     ways(step, 3)
-    assert [step.taken(step=k, progress=p).how for k, p in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01))] == [
-        "repeated"
-    ] * 3
+    for k, progress in ((1, 0.1), (2, 0.3), (6, PRIORS_FROM - 0.01)):
+        assert step.taken(step=k, progress=progress).how == "repeated"
     assert [step.taken(step=3).how for _ in range(2)] == ["called", "recorded"]
     assert step.taken(step=7).how == step.taken(step=95).how == "repeated"
     assert step.taken(step=99).how == "repeated" and step.taken(step=98).how == "repeated"

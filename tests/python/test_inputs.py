@@ -300,12 +300,8 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
     (tmp_path / "a").mkdir()
     for name in ("a/u\u0308ber.png", "a/b.PNG", "a/c.JPG"):
         (tmp_path / name).write_bytes(b"")
-    for listed, expected in (
-        ("a\\\u00fcber.png", "a/u\u0308ber.png"),
-        ("a/b", "a/b.PNG"),
-        (".\\a\\c", "a/c.JPG"),
-        ("a/c.jpg", "a/c.JPG"),
-    ):
+    names = {"a\\\u00fcber.png": "a/u\u0308ber.png", "a/b": "a/b.PNG", ".\\a\\c": "a/c.JPG", "a/c.jpg": "a/c.JPG"}
+    for listed, expected in names.items():
         assert listed_image(tmp_path, listed, Path("t")).samefile(tmp_path / expected)
     assert listed_file(tmp_path, "a\\b.PNG", Path("t")).samefile(tmp_path / "a/b.PNG")
 
@@ -319,10 +315,8 @@ def test_a_mask_is_no_photo(tmp_path):
     (tmp_path / "train/r_2.png").rename(tmp_path / "train/a.jpg")
     write_image(tmp_path / "train/a.png", np.ones((SIZE, SIZE)))
     frames = transforms.read(tmp_path, "train")
-    assert (
-        frames[2].image_path.name == "a.jpg"
-        and frames[3].mask_path is frames[3].behind_path is frames[4].mask_path is None
-    )
+    assert frames[2].image_path.name == "a.jpg"
+    assert frames[3].mask_path is frames[3].behind_path is frames[4].mask_path is None
     (tmp_path / "train/a.jpg").unlink()
     (tmp_path / "train/a.jpg.png").write_bytes(b"")
     for name in ("train/a", "train/a.jpg"):
@@ -343,9 +337,8 @@ def test_the_model_of_most_images_is_read_whatever_its_bytes(tmp_path, capsys):
         folder.mkdir(parents=True)
         (folder / "cameras.txt").write_text("1 PINHOLE 48.0 48 60 60 24 24\n")
         points = " ".join(["1.0 2.0 7"] * n_points)
-        (folder / "images.txt").write_text(
-            "".join(f"{i} 1 0 0 0 0 0 {i} 1 r_{i}.png\n{points}\n" for i in range(n_images))
-        )
+        lines = [f"{i} 1 0 0 0 0 0 {i} 1 r_{i}.png\n{points}\n" for i in range(n_images)]
+        (folder / "images.txt").write_text("".join(lines))
     (tmp_path / "images").mkdir()
     for i in range(4):
         write_image(tmp_path / f"images/r_{i}.png", np.ones((48, 48, 4), np.float32))
@@ -363,25 +356,24 @@ def test_data_of_close_ups_have_a_page(tmp_path, capsys):
     for split in ("train", "test"):
         for path in (data / split).glob("*.png"):
             write_image(path, read_image(path)[10:38, 10:38])
-        edit(
-            data,
-            lambda meta: meta.update(camera_angle_x=2 * np.arctan(np.tan(ANGLE / 2) * 28 / SIZE)),
-            f"transforms_{split}.json",
-        )
+        angle = 2 * np.arctan(np.tan(ANGLE / 2) * 28 / SIZE)
+        edit(data, lambda meta, angle=angle: meta.update(camera_angle_x=angle), f"transforms_{split}.json")
     assert main(["inspect", str(data), "--out", str(tmp_path / "page.html")]) == DONE
     assert "cut" in capsys.readouterr().out and (tmp_path / "page.html").stat().st_size > 1000
 
 
 def test_a_world_that_hangs_is_said(tmp_path):
     data = make_blender(tmp_path, train=8)
-    assert not {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}[
-        "upward by the cameras"
-    ].advice
+
+    def upward():
+        findings = inspect(load_dataset(data), None, Reading()).findings
+        return next(finding for finding in findings if finding.name == "upward by the cameras")
+
+    assert not upward().advice
     turn = np.diag([1.0, -1, -1, 1])
     for frame in range(8):
         edit(data, set_pose(frame, lambda pose: (turn @ pose).tolist()))
-    finding = {f.name: f for f in inspect(load_dataset(data), None, Reading()).findings}["upward by the cameras"]
-    assert finding.value == "(0.00, 0.00, -1.00)" and "turn the data's world" in finding.advice
+    assert upward().value == "(0.00, 0.00, -1.00)" and "turn the data's world" in upward().advice
 
 
 def test_keys_that_are_not_used_are_named(tmp_path, capsys):
@@ -395,9 +387,8 @@ def test_keys_that_are_not_used_are_named(tmp_path, capsys):
     edit(tmp_path, lambda meta: meta.update(k1=0.1, camera_type="orthographic"))
     assert len(transforms.read_camera_path(tmp_path / "transforms_train.json")) == 6
     said = capsys.readouterr().err
-    assert (
-        "has lenses that distort; drawn as pinholes" in said and "not used: aabb_scale, applied_scale, camera" in said
-    )
+    assert "has lenses that distort; drawn as pinholes" in said
+    assert "not used: aabb_scale, applied_scale, camera" in said
 
 
 def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tmp_path, capsys):

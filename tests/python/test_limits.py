@@ -47,13 +47,8 @@ def files(tmp_path_factory):
     light[4:8, 10:14] = 8
     write_image(folder / "light.exr", light)
     write_image(folder / "turned.exr", np.roll(light, 11, axis=1))
-    data = synthesise(
-        folder / "balls.glb",
-        folder / "light.exr",
-        [folder / "turned.exr"],
-        folder / "data",
-        SynthSettings(size=32, train=2, test=2, spp=64),
-    )
+    settings, lights = SynthSettings(size=32, train=2, test=2, spp=64), (folder / "light.exr", [folder / "turned.exr"])
+    data = synthesise(folder / "balls.glb", *lights, folder / "data", settings)
     (folder / "run").mkdir()
     write_glb(folder / "run" / "mesh.glb", spoiled(read_asset(data / "asset.glb")))
     write_image(folder / "run" / "environment.exr", 0.5 * light)

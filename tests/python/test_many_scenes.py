@@ -59,11 +59,8 @@ def test_two_folders_of_one_name_are_two_scenes_and_stay_so(tmp_path):
     again = known_scenes(tmp_path)
     assert again == known
     asked = requested_scenes(again, [Path("/d/chair"), Path("/c/Chair"), Path("/b/chair")])
-    assert [(s.name, s.data) for s in asked] == [
-        ("chair-4", "/d/chair"),
-        ("Chair-3", "/c/Chair"),
-        ("chair-2", "/b/chair"),
-    ]
+    expected = [("chair-4", "/d/chair"), ("Chair-3", "/c/Chair"), ("chair-2", "/b/chair")]
+    assert [(s.name, s.data) for s in asked] == expected
     assert [s.name for s in again] == ["chair", "chair-2", "Chair-3", "chair-4"]
 
 
@@ -173,9 +170,8 @@ def test_a_share_is_what_the_user_says():
 def test_more_than_a_machine_has_is_refused(asked):
     with pytest.raises(InputError, match="no machine offers .*; request less by --cores-per-scene"):
         share_of([LAPTOP], 1, **NOTHING_ASKED | asked)
-    with pytest.raises(
-        InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"
-    ):  # one has the cores, the other the GPUs
+    # One has the cores, the other the GPUs.
+    with pytest.raises(InputError, match="no machine offers 2 cores, 1 GPU and 1 GB"):
         share_of([{**NODE, "GPU": 0.0}, {**NODE, "CPU": 1.0}], 1, cores=2, gpus=1, memory=1)
 
 
@@ -360,7 +356,7 @@ def batch_of(tmp_path: Path, ends: dict[str, list], retries: int = 3) -> tuple:
 
 
 KILLED, REFUSED = Outcome(-9, "was killed by SIGKILL", False), Outcome(2, "bad", False)
-BROKE = Outcome(1, "loss is nan", False)
+WELL, BROKE = Outcome(0, "", False), Outcome(1, "loss is nan", False)
 LOST = ERRORS.WorkerCrashedError()
 
 
@@ -374,19 +370,15 @@ def finish_run(run: Path, steps: int = 4) -> None:
 
 def test_only_killed_scenes_are_tried_again(tmp_path):
     """Of the worker or of the process in it, or asked to end by another than us; each goes on in its turn."""
-    done, asked = Outcome(0, "", False), Outcome(130, "stopped at step 8", False)
+    asked = Outcome(130, "stopped at step 8", False)
     for name in "abc":
         finish_run(tmp_path / name)
-    batch, ray, rows, notes, ended = batch_of(
-        tmp_path, {"/a": [LOST, KILLED, done], "/b": [done], "/c": [asked, done], "/d": [REFUSED], "/e": [BROKE]}
-    )
+    ends = {"/a": [LOST, KILLED, WELL], "/b": [WELL], "/c": [asked, WELL], "/d": [REFUSED], "/e": [BROKE]}
+    batch, ray, rows, notes, ended = batch_of(tmp_path, ends)
     assert ended and ray.begun == ["/a", "/b", "/c", "/d", "/e", "/a", "/c", "/a"]
     assert rows == [("b", "done"), ("d", "refused"), ("e", "failed"), ("c", "done"), ("a", "done")]
-    assert [note.partition(";")[0] for note in notes] == [
-        "a: its worker was killed",
-        "c: stopped at step 8",
-        "a: was killed by SIGKILL",
-    ]
+    reasons = [note.partition(";")[0] for note in notes]
+    assert reasons == ["a: its worker was killed", "c: stopped at step 8", "a: was killed by SIGKILL"]
     assert [note[-11:] for note in notes] == ["retry 1 of 3"[1:], "retry 1 of 3"[1:], "retry 2 of 3"[1:]]
     found = {scene.name: scene for scene in known_scenes(tmp_path)}
     assert found["a"].minutes == 2 and found["a"].steps == 4 and found["a"].scores == {"views": 30.0}
@@ -403,9 +395,7 @@ def test_retries_come_to_an_end(tmp_path):
 def test_an_interrupt_cancels_all_and_waits_for_them(tmp_path):
     finish_run(tmp_path / "a")
     finish_run(tmp_path / "b")
-    batch, ray, rows, notes, ended = batch_of(
-        tmp_path, {"/a": [Outcome(0, "", False)], "/b": [KeyboardInterrupt], "/c": [LOST]}
-    )
+    batch, ray, rows, notes, ended = batch_of(tmp_path, {"/a": [WELL], "/b": [KeyboardInterrupt], "/c": [LOST]})
     assert not ended and rows == [("a", "done"), ("b", "stopped"), ("c", "waiting")] and len(ray.cancelled) == 2
-    ends = {"/a": [Outcome(0, "", False)], "/b": [REFUSED], "/c": [Outcome(0, "", False)]}
+    ends = {"/a": [WELL], "/b": [REFUSED], "/c": [WELL]}
     assert batch_of(tmp_path, ends)[2] == [("a", "done"), ("b", "refused"), ("c", "done")]  # a second call

@@ -303,11 +303,8 @@ def test_a_cap_keeps_its_places_and_normals():
     def leaning(x: torch.Tensor) -> tuple[torch.Tensor, ...]:
         return 0.5 + 0.5 * x[:, 2:].expand(-1, 3), *surface.materials(x)[1:3], surface.gradient(x)[1]
 
-    vertices, faces, leans = (
-        np.float32(mesh.vertices),
-        np.int32(mesh.faces),
-        dataclasses.replace(surface, materials=leaning),
-    )
+    vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
+    leans = dataclasses.replace(surface, materials=leaning)
     sizes = {"n_faces": 0, "texture_size": 128, "spacing": 0.05, "occlusion_offset": 0.01}
     found = textured_asset("ball", vertices, faces, leans, **sizes, on_surface=mesh.vertices[:, 2] > 0).asset
     radius, up = np.linalg.norm(found.vertices, axis=1), found.vertices[:, 2]

@@ -238,12 +238,8 @@ def test_the_light_is_scaled_to_the_truth_and_judged_by_the_truths_white():
 def test_the_distance_is_asked_for_views_and_for_albedo():
     truth = ViewTruth(albedo=np.full((SIZE, SIZE, 3), 0.3, np.float32))
     prediction = {"rgb": picture(0.6, 1.0)[..., :3], "alpha": np.ones((SIZE, SIZE)), "albedo": truth.albedo}
-    scores = evaluate_maps(
-        [prediction],
-        dataset(picture(0.5, 1.0)),
-        [truth],
-        distance=lambda image, truth: 0.25 + image.mean() - truth.mean(),
-    )
+    distance = lambda image, truth: 0.25 + image.mean() - truth.mean()
+    scores = evaluate_maps([prediction], dataset(picture(0.5, 1.0)), [truth], distance=distance)
     assert [scores[key]["lpips"] for key in ("novel_view", "albedo")] == pytest.approx([0.35, 0.25], abs=1e-5)
 
 

@@ -152,9 +152,6 @@ def test_numbers_that_are_out_of_range_stay_within_the_photos():
     cameras, every = (torch.eye(3).repeat(2, 1, 1), torch.zeros(2, 3)), PixelList.all(2 * 4 * 5, torch.device("cpu"))
     runs = PixelList(torch.tensor([2, 3, 7]), torch.tensor([1, 5, 30]), 7)  # pixels 1 2, 7, 33 34 35 36
     beyond = PixelList(torch.tensor([3]), torch.tensor([1000]), 3)
-    for random, n_near, near, pixels in (
-        ([0.5, 0.5], 2, beyond, [39, 39]),
-        ([-3.0, 2.0], 0, runs, [0, 39]),
-        ([-3.0, 2.0], 2, runs, [1, 36]),
-    ):
+    draws = ([0.5, 0.5], 2, beyond, [39, 39]), ([-3.0, 2.0], 0, runs, [0, 39]), ([-3.0, 2.0], 2, runs, [1, 36])
+    for random, n_near, near, pixels in draws:
         assert draw_rays(torch.tensor(random), n_near, near, every, *cameras, 4, 5)[3].tolist() == pixels

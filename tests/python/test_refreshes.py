@@ -69,9 +69,8 @@ def refreshed(data, tmp_path, monkeypatch):
 def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_first(refreshed):
     """Every 6 steps, all cells at first and at the end; the hull until 0.4 of the run, which is step 8."""
     trained, seen = refreshed(grid_every=6, hull_until=0.4)
-    assert seen["grid"] == [
-        (step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)
-    ] + [(19, {})]
+    expected = [(step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)]
+    assert seen["grid"] == [*expected, (19, {})]
     assert 0 < trained.grid.hull.float().mean() < 0.6
 
 
@@ -167,12 +166,8 @@ def test_the_number_of_rays_follows_that_of_the_samples(data, tmp_path):
 def test_counts_of_a_line_are_per_ray_and_per_point_looked_at(tmp_path):
     """Of 50 rays: 600 points looked at, 300 composited, 120 shaded; and the steps that were skipped."""
     log = StepLog(tmp_path)
-    log.take(
-        StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600),
-        3.0,
-        0.5,
-        skipped=5,
-    )
+    numbers = StepNumbers(7, 50, {"colour": 0.25}, {"colour": 2.0}, 1.0, Capacity(300, 120, 40), 20.0, 600)
+    log.take(numbers, 3.0, 0.5, skipped=5)
     line = log.pending
     counts = {"rays": 50, "samples_per_ray": 12.0, "kept": 0.5, "shaded": 0.2, "skipped": 5, "step": 7, "s": 20.0}
     expected = counts | {"loss": 0.5, "loss_colour": 0.5}
@@ -272,15 +267,10 @@ def test_a_thread_makes_the_meshes_where_that_is_set(data, tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [
-        {},
-        {"occlusion.kind": "off", "shading.method": "split"},
-        {"occlusion.kind": "mlp", "shading.method": "split", "occlusion_weight": 0.0},
-    ],
+    "settings", [{"preview_every": 2.0}, PLAIN, PLAIN | {"occlusion.kind": "mlp", "occlusion_weight": 0.0}]
 )
 def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, settings):
-    train_scene(load_dataset(data), tiny(steps=6, mesh_every=0.3, preview_every=2.0, **settings), tmp_path)
+    train_scene(load_dataset(data), tiny(steps=6, mesh_every=0.3, **settings), tmp_path)
     assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
 
 

@@ -99,11 +99,8 @@ def test_a_path_keeps_its_lens_at_any_size(tmp_path):
 
 
 def test_composition_is_linear_and_the_shadow_darkens_what_is_behind():
-    images = {
-        "radiance": np.array([[[0.2, 0.4, 0.6]]], np.float32),
-        "alpha": np.array([[0.5]], np.float32),
-        "shadow": np.array([[0.25]], np.float32),
-    }
+    pixel = {"radiance": [0.2, 0.4, 0.6], "alpha": 0.5, "shadow": 0.25}
+    images = {name: np.array([[value]], np.float32) for name, value in pixel.items()}
     clear = compose(images, None, 2.0)
     assert clear[0, 0] == pytest.approx([0.4, 0.8, 1.2, 0.75])
     behind = np.array([[[1.0, 0.5, 0.0]]], np.float32)

@@ -19,11 +19,8 @@ def oblique(n: int = 20, dtype: torch.dtype = torch.float32) -> tuple[torch.Tens
     g = generator(7)
     offsets = unit(torch.randn(n, 2, generator=g)) * torch.linspace(1.03, 0.2, n)[:, None] * RADIUS
     origins = torch.cat([torch.full((n, 1), 4.0), offsets], 1)
-    return (
-        origins.to(dtype),
-        torch.tensor([[-1.0, 0, 0]], dtype=dtype).expand(n, 3),
-        torch.rand(n, generator=g).to(dtype),
-    )
+    directions = torch.tensor([[-1.0, 0, 0]]).expand(n, 3)
+    return tuple(x.to(dtype) for x in (origins, directions, torch.rand(n, generator=g)))
 
 
 def rendered(model: SceneModel, found, **options) -> RenderedRays:
@@ -188,21 +185,14 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     occlusion = Given(lambda _, x, *__: Occlusion(x.new_ones(len(x), 1), x.new_ones(len(x), 1)))
     model.has_mesh, model.occlusion_at = True, occlusion.forward
     monkeypatch.setattr(model, "evaluate_light", model.light.evaluate)
-    asked = []
-    monkeypatch.setattr(
-        model,
-        "quadrature_correction",
-        lambda *args: asked.append(args) or (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3)),
-    )
+    asked, nothing = [], (torch.zeros(0, dtype=torch.int64), torch.zeros(0, 3))
+    monkeypatch.setattr(model, "quadrature_correction", lambda *args: asked.append(args) or nothing)
     cells = FULL.clone()
     cells[6:10] = CELL_EMPTY
     n = 4
-    rays = (
-        torch.tensor([[4.0, 0.1, 0.2]]).repeat(n, 1),
-        torch.tensor([[-1.0, 0, 0]]).repeat(n, 1),
-        torch.rand(n, generator=generator(3)),
-    )
-    rays[0][2, 1] = 9.0  # beside the box
+    origins, directions = (torch.tensor([x]).repeat(n, 1) for x in ([4.0, 0.1, 0.2], [-1.0, 0, 0]))
+    origins[2, 1] = 9.0  # beside the box
+    rays = origins, directions, torch.rand(n, generator=generator(3))
     ray = rendered(model, find_samples(model, cells, *rays), shades_per_ray=6, capacity=capacity)
     m, n_rays, n_segments = ray.sizes.tolist()
     assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8

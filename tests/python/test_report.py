@@ -146,13 +146,8 @@ def test_report_is_self_contained_and_escaped(tmp_path):
 
 def test_no_name_ends_the_script(tmp_path):
     history = [{"step": s, "loss": 1.0, f"loss_{HOSTILE}": 0.5} for s in range(3)]
-    changes = {
-        "title": HOSTILE,
-        "summary": {HOSTILE: {HOSTILE: HOSTILE}},
-        "timings": {HOSTILE: 1.0},
-        "history": history,
-    }
-    page, parsed = write(tmp_path, views=[make_view(True) | {"name": HOSTILE}], **changes)
+    changes = {"title": HOSTILE, "summary": {HOSTILE: {HOSTILE: HOSTILE}}, "timings": {HOSTILE: 1.0}}
+    page, parsed = write(tmp_path, views=[make_view(True) | {"name": HOSTILE}], history=history, **changes)
     assert set(parsed.scripts) == {"data", "bundle"}
     assert data_of(parsed)["charts"][1]["series"][0]["name"] == HOSTILE
     assert "alert(1)</script>" not in page and "<!--" not in page
@@ -171,16 +166,9 @@ def test_what_is_not_finite_never_reaches_the_script(tmp_path):
 
 
 def test_report_without_truth_or_history(tmp_path):
-    changes = {
-        "lights": [],
-        "light_truth": None,
-        "light": None,
-        "history": [],
-        "timings": {},
-        "relit": [],
-        "grades": [],
-    }
-    page, parsed = write(tmp_path, views=[make_view(False)], **changes)
+    nothing = {"light_truth": None, "light": None, "timings": {}}
+    nothing |= {name: [] for name in ("lights", "history", "relit", "grades")}
+    page, parsed = write(tmp_path, views=[make_view(False)], **nothing)
     assert len(parsed.pictures) == 7
     assert "<h2>Light</h2>" not in page and "<svg" not in page and "dB<" not in page and "<h2>Object</h2>" not in page
     assert data_of(parsed)["charts"] == [] and data_of(parsed)["lights"] == []
@@ -285,16 +273,11 @@ def test_the_object_comes_first_then_what_was_promised_then_scores(tmp_path, glb
     page, parsed = write(tmp_path, asset=glb)
     sections = re.findall(r'<section id="(\w+)"', page)
     assert sections == ["object", "relit", "scores", "views", "light", "training", "numbers"]
-    assert [name for name in parsed.references if not name.startswith(("#", "data:"))] == [
-        "mesh.glb",
-        "environment.exr",
-    ]
+    named = [name for name in parsed.references if not name.startswith(("#", "data:"))]
+    assert named == ["mesh.glb", "environment.exr"]
     assert ">1.2 MB<" in page and "1,280 faces, textures of 512 x 512, 64 x 64 pixels; 2 x 2 x 2 units" in page
-    textures = {
-        image["alt"]: picture_of(image)
-        for image in parsed.pictures
-        if image["alt"] in ("albedo", "roughness", "metallic", "normals")
-    }
+    names = ("albedo", "roughness", "metallic", "normals")
+    textures = {image["alt"]: picture_of(image) for image in parsed.pictures if image["alt"] in names}
     assert textures["albedo"].shape == (512, 512, 3)
     assert [float(textures[name].mean()) for name in ("roughness", "metallic")] == pytest.approx([0.5, 0.0], abs=0.01)
     assert textures["normals"].mean(axis=(0, 1)) == pytest.approx([0.5, 0.5, 1.0], abs=0.01)
@@ -305,22 +288,14 @@ def test_the_object_comes_first_then_what_was_promised_then_scores(tmp_path, glb
 
 def test_scores_are_said_in_words():
     """Higher is better, lower is better; the limits belong to the better word; what is missing has no row."""
-    rows = [
-        ({"novel_view": {"psnr": value}}, word)
-        for value, word in ((30.0, "good"), (29.9, "fair"), (25.0, "fair"), (24.9, "poor"))
-    ]
-    rows += [
-        ({"normal_mae_deg": value}, word)
-        for value, word in ((5.0, "good"), (5.1, "fair"), (12.0, "fair"), (12.1, "poor"))
-    ]
+    words = "good", "fair", "fair", "poor"
+    rows = [({"novel_view": {"psnr": value}}, word) for value, word in zip((30.0, 29.9, 25.0, 24.9), words)]
+    rows += [({"normal_mae_deg": value}, word) for value, word in zip((5.0, 5.1, 12.0, 12.1), words)]
     for evaluation, word in rows:
         assert [row["word"] for row in graded(evaluation | {"relight": None, "f_score": None})] == [word], evaluation
     (angle,) = graded({"normal_mae_deg": 7.12345})
-    assert (angle["name"], angle["value"], angle["scale"]) == (
-        "Normals",
-        "7.1° off",
-        "good up to 5° off, poor above 12° off",
-    )
+    said = angle["name"], angle["value"], angle["scale"]
+    assert said == ("Normals", "7.1° off", "good up to 5° off, poor above 12° off")
 
 
 def test_the_scale_of_scores_keeps_the_digits_that_count():

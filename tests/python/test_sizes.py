@@ -81,11 +81,9 @@ def test_averages_have_whole_blocks_of_each_photo_alone(mixed, downscale):
     parts = load_dataset(mixed)
     small = load_dataset(mixed, downscale=downscale) if downscale > 1 else parts
     assert (small.sizes == parts.sizes // downscale).all()
-    averaged = [small] + (
-        [parts.averaged(downscale, 0.0), parts.averaged(downscale, 0.0, partial(average_with_edges, width=2))]
-        if downscale > 1
-        else []
-    )
+    averaged, with_edges = [small], partial(average_with_edges, width=2)
+    if downscale > 1:
+        averaged += [parts.averaged(downscale, 0.0), parts.averaged(downscale, 0.0, with_edges)]
     for split in averaged:
         assert (split.sizes == small.sizes).all()
         for i in range(len(split)):
@@ -136,13 +134,10 @@ def test_photos_of_two_sizes_become_an_asset(data, tmp_path, capsys):
     assert main(["inspect", str(mixed), "--out", str(tmp_path / "page.html")]) == DONE
     sizes = {f"{view.width}x{view.height}" for view in data_views(mixed, "train", None)}
     assert len(sizes) == 4
-    viewed = ViewedPhotos(mixed)
-    for camera, png, expected in zip(
-        viewed.cameras(), map(viewed.png, range(len(viewed))), data_views(mixed, "train", None)
-    ):
-        assert (
-            (camera["width"], camera["height"]) == Image.open(io.BytesIO(png)).size == (expected.width, expected.height)
-        )
+    viewed, views = ViewedPhotos(mixed), data_views(mixed, "train", None)
+    for camera, png, expected in zip(viewed.cameras(), map(viewed.png, range(len(viewed))), views):
+        size = camera["width"], camera["height"]
+        assert size == Image.open(io.BytesIO(png)).size == (expected.width, expected.height)
         assert camera["intrinsics"] == pytest.approx(expected.intrinsics)
     test = load_dataset(mixed, "test")
     for truth, image in zip(load_view_truths(test), test.images):

@@ -48,12 +48,8 @@ def gain(f0, f1, f2, compensated: bool):
 
 
 def split_sum_shade(row: dict[str, np.ndarray], shared: Rows) -> dict[str, list]:
-    view, roughness, metallic = (
-        vector(row["view_dirs"]),
-        mp.mpf(float(row["roughness"][0])),
-        mp.mpf(float(row["metallic"][0])),
-    )
-    cosine = turned(vector(row["normals"]), view)[1]
+    roughness, metallic = (mp.mpf(float(row[name][0])) for name in ("roughness", "metallic"))
+    cosine = turned(vector(row["normals"]), vector(row["view_dirs"]))[1]
     f1, f2, _, layer = table(cosine, roughness)
     names = ("albedo", "specular", "diffuse", "occlusion_s", "occlusion_d", "indirect_s", "indirect_d")
     out: dict[str, list] = {}

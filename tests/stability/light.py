@@ -70,11 +70,8 @@ def pyramid() -> Rows:
 
 def looked_up(rows: Rows, shared: Rows) -> Rows:
     resolutions, nodes = torch.tensor(RESOLUTIONS), torch.tensor(NODES, dtype=torch.float64)
-    return {
-        "radiance": ops.light.light_lookup(
-            rows["directions"], rows["roughness"], shared["levels"], shared["sh"], resolutions, nodes, shared["zonal"]
-        )
-    }
+    tables = shared["levels"], shared["sh"], resolutions, nodes, shared["zonal"]
+    return {"radiance": ops.light.light_lookup(rows["directions"], rows["roughness"], *tables)}
 
 
 @lru_cache(maxsize=2)

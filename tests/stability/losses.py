@@ -63,13 +63,8 @@ def draw_gradients(draw: Draw, n: int) -> Rows:
 
 
 def field_gradients(rows: Rows, shared: Rows) -> Rows:
-    beside = torch.arange(PAIRS)
-    return batches(
-        rows,
-        ("gradients", "weights"),
-        lambda g, w: ops.training.gradient_losses(g, w, beside),
-        ("eikonal", "smoothness"),
-    )
+    losses = lambda g, w: ops.training.gradient_losses(g, w, torch.arange(PAIRS))
+    return batches(rows, ("gradients", "weights"), losses, ("eikonal", "smoothness"))
 
 
 def draw_points(draw: Draw, n: int) -> Rows:

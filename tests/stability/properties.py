@@ -218,17 +218,8 @@ def sampled(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     jitter = draw.shares(n).clamp(max=1 - 6e-8)
     rows = {"rays_o": origins.float(), "rays_d": directions.float(), "jitter": jitter.float()}
     cells = torch.full((16, 16, 16), ops.rays.CELL_OCCUPIED, dtype=torch.uint8)
-    found, _, _ = ops.sdf.sample_rays(
-        **rows,
-        cells=cells,
-        network=sheet(thickness),
-        step=step,
-        s=s,
-        min_weight=1e-3,
-        min_transmittance=1e-4,
-        reach=7 / s,
-        lipschitz=1.25,
-    )
+    limits = {"min_weight": 1e-3, "min_transmittance": 1e-4, "reach": 7 / s, "lipschitz": 1.25}
+    found, _, _ = ops.sdf.sample_rays(**rows, cells=cells, network=sheet(thickness), step=step, s=s, **limits)
     ray, middle = found.ray_indices, found.middles.double()
     point = rows["rays_o"].double()[ray] + rows["rays_d"].double()[ray] * middle[:, None]
     nearest = torch.full((n,), torch.inf, dtype=torch.float64).scatter_reduce(0, ray, point[:, 2].abs(), "amin")
@@ -328,11 +319,8 @@ def marched(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     targets = torch.round(draw.uniform(n, 3, low=-1, high=1) * side / 2) * 2 / side
     directions = draw.directions(n)
     origins = targets - directions * draw.mixed((0.0, 1e-7, 1.0, 3.0, 1e4), draw.uniform(n, 1, high=4))
-    rows = {
-        "rays_o": origins.float(),
-        "rays_d": directions.float(),
-        "jitter": draw.shares(n).clamp(max=1 - 6e-8).float(),
-    }
+    jitter = draw.shares(n).clamp(max=1 - 6e-8).float()
+    rows = {"rays_o": origins.float(), "rays_d": directions.float(), "jitter": jitter}
     found = ops.march_rays(rows["rays_o"], rows["rays_d"], rows["jitter"], cells, box=box, step=step, max_samples=limit)
     ray, start = found.ray_indices, found.t_starts.double()
     point = rows["rays_o"].double()[ray] + rows["rays_d"].double()[ray] * (start + step / 2)[:, None]

@@ -77,11 +77,8 @@ def draw_surface(draw: Draw, n: int) -> Rows:
     sdf = torch.where(draw.chance(0.7, n, 1), along, wild)
     gradient = draw.vectors(n * SAMPLES).reshape(n, SAMPLES, 3)
     near = unit(draw.normal(n, SAMPLES, 3)) * draw.uniform(n, SAMPLES, 1, low=0.8, high=1.2)
-    return {
-        "sdf": sdf,
-        "gradient": torch.where(draw.chance(0.7, n, 1, 1), near, gradient),
-        "rays_d": draw.directions(n),
-    }
+    gradient = torch.where(draw.chance(0.7, n, 1, 1), near, gradient)
+    return {"sdf": sdf, "gradient": gradient, "rays_d": draw.directions(n)}
 
 
 def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
@@ -99,11 +96,8 @@ def surface(rows: Rows, shared: Rows, anneal: float) -> Rows:
 
 
 def repaired_surface(rows: Rows) -> Rows:
-    return {
-        "sdf": rows["sdf"].clamp(-1, 1),
-        "gradient": rows["gradient"].clamp(-1e6, 1e6),
-        "rays_d": unit(rows["rays_d"].double()),
-    }
+    sdf, gradient = rows["sdf"].clamp(-1, 1), rows["gradient"].clamp(-1e6, 1e6)
+    return {"sdf": sdf, "gradient": gradient, "rays_d": unit(rows["rays_d"].double())}
 
 
 def draw_composite(draw: Draw, n: int, samples: int) -> Rows:
@@ -147,13 +141,8 @@ def interpolated(rows: Rows, shared: Rows) -> Rows:
 
 
 def ends_entry(name: str, s: float, draw, step: float, **changes) -> Entry:
-    options = {
-        "bound": 4e-6,
-        "gradient_bound": 8e-6,
-        "floor": 1e-30,
-        "gradient_floor": 1e-30 * s,
-        "exact": partial(exact_rays.weights_along_z, step=step),
-    }
+    options = {"bound": 4e-6, "gradient_bound": 8e-6, "floor": 1e-30, "gradient_floor": 1e-30 * s}
+    options["exact"] = partial(exact_rays.weights_along_z, step=step)
     return Entry(
         name,
         draw=partial(draw, step=step),

@@ -97,15 +97,10 @@ def shade_modes(rows: Rows, shared: Rows) -> Rows:
 
 
 def shade_from_sums(rows: Rows, shared: Rows) -> Rows:
-    given = [
-        *(rows[name] for name in SHADED[:5]),
-        torch.stack([rows[name] for name in ops.shading.LightSums._fields], 1),
-    ]
-    modes = {
-        "single": (False, None, None),
-        "compensated": (True, None, None),
-        "mixed": (True, rows["other"], rows["share"][:, 0]),
-    }
+    sums = torch.stack([rows[name] for name in ops.shading.LightSums._fields], 1)
+    given = [*(rows[name] for name in SHADED[:5]), sums]
+    modes = {"single": (False, None, None), "compensated": (True, None, None)}
+    modes["mixed"] = True, rows["other"], rows["share"][:, 0]
     return {name: lib.shade_sums(*given, shared["lut"].float(), *mode) for name, mode in modes.items()}
 
 
@@ -141,11 +136,8 @@ def sky(n: int) -> Rows:
     radiance: Tensor = draw.uniform(n, 3)
     radiance[n // 2 :] = 0
     radiance[-1] = 1e6
-    return {
-        "directions": unit(draw.normal(n, 3)).float(),
-        "solid_angles": draw.uniform(n).float(),
-        "radiance": radiance.float(),
-    }
+    towards, solid_angles = unit(draw.normal(n, 3)).float(), draw.uniform(n).float()
+    return {"directions": towards, "solid_angles": solid_angles, "radiance": radiance.float()}
 
 
 def draw_linear(draw: Draw, n: int) -> Rows:
