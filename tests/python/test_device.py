@@ -23,6 +23,16 @@ from splitnerf.training.meshes import SurfaceMesh
 from splitnerf.training.step import Capacity
 from tiny_runs import lines_of, refused, tiny, train_scene
 
+
+def test_two_devices_in_one_call_are_told(monkeypatch):
+    """Else no test of this file would find any."""
+    with pretend_gpu(monkeypatch):
+        here, there, random = torch.ones(3), torch.ones(3, device="cuda"), torch.Generator("cuda")
+        for wrong in (lambda: here + there, lambda: there[here.long()], lambda: torch.rand(3, generator=random)):
+            with pytest.raises(RuntimeError, match="two devices"):
+                wrong()
+
+
 # In 200 steps with 10 lines of metrics.jsonl, 6 updates of the grid (paper: 13) and one mesh. Parameters are checked before the
 # mesh is made. Preset paper finds all samples of its rays and shades each, so that its steps wait for two counts anyway; each update of
 # its grid draws among the occupied cells. From the mesh on, in 115 steps, a panorama of its light is painted every 16 steps, and the

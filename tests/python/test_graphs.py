@@ -139,3 +139,10 @@ def test_a_capacity_changes_roundings_alone(data):
             torch.testing.assert_close(padded_terms[name], value, rtol=1e-5, atol=1e-7)
     for (name, _), a, b in zip(model.named_parameters(), padded_grads, grads, strict=True):
         assert (a - b).norm() <= 1e-4 * b.norm(), name
+
+
+def test_waiting_while_recording_is_refused():
+    """Else no test of this file would find any."""
+    for waits in (lambda x: x.sum().item(), lambda x: x.nonzero(), lambda x: x[x > 0]):
+        with pytest.raises(RuntimeError, match="waits"):
+            pretend_graphs.record(lambda: waits(torch.ones(3)), None, torch.Generator())
