@@ -66,7 +66,9 @@ def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
         if len(kept) < spec.nchannels:
             others = [channel for i, channel in enumerate(spec.channelnames) if i not in kept]
             if {"RY", "BY"} <= set(others):
-                raise InputError(f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B")
+                raise InputError(
+                    f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B"
+                )
             note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
