@@ -211,10 +211,9 @@ def print_refinement(summary: dict | None) -> None:
     if summary["level"] != 1:
         print(f"the light was made {summary['level']:.2f} times as bright, as highlights ask")
     if max(summary["tint"]) > 1:
+        factors = ", ".join(f"{factor:.2f}" for factor in summary["tint"])
         print(
-            "the metal of one faint colour is taken for grey, and the light for {:.2f} {:.2f} {:.2f}".format(
-                *summary["tint"]
-            )
+            f"metal of one faint colour is taken for grey: the light's red, green and blue are multiplied by {factors}"
         )
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
