@@ -98,10 +98,7 @@ TRANSFORMS = {
     "zero frames": (meta(lambda m: m["frames"].clear()), "transforms_train.json: has no frames"),
     "no angle": (meta(lambda m: m.pop("camera_angle_x")), "transforms_train.json: missing key 'camera_angle_x'"),
     "bad angle": (meta(lambda m: m.update(camera_angle_x="1")), "must be a positive num.* below pi, got the text '1'"),
-    "angle of degrees": (
-        meta(lambda m: m.update(camera_angle_x=40)),
-        "_x' must be .* radians below pi, got 40; repair",
-    ),
+    "angle of degrees": (meta(lambda m: m.update(camera_angle_x=40)), "_x' must be .* radians below pi, got 40"),
     "tiny width": (meta(lambda m: m.update(w=1e-300, fl_x=20)), "'w' must be a positive number"),
     "no file path": (meta(lambda m: m["frames"][1].pop("file_path")), "missing key 'file_path' in frame 1"),
     "no pose": (meta(lambda m: m["frames"][1].pop("transform_matrix")), "missing key 'transform_matrix' in frame 1"),
@@ -118,9 +115,7 @@ TRANSFORMS = {
     "name of half a character": (frame(file_path="\ud800"), "no such image"),
     "mask's name too long": (frame(mask_path="x" * 5000), "no such image"),
     "one image twice": (frame(file_path="train/../train/r_2"), "r_2.png: two frames have this image; remove one"),
-    **{
-        f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a posit") for x in ("bright", -1, 0, np.nan)
-    },
+    **{f"exposure {x}": (frame(exposure=x), "'exposure' of frame 1 must be a pos") for x in ("bright", -1, 0, np.nan)},
     **{f"gamma {x}": (frame(gamma=x), "'gamma' must be 0") for x in ("sRGB", -1, 0.5, float("nan"))},
     "no json": (file("transforms_train.json", b"{not json"), "transforms_train.json: is not valid json"),
     "a json list": (file("transforms_train.json", b"[1, 2]"), "transforms_train.json: must hold a json object"),
@@ -129,24 +124,15 @@ TRANSFORMS = {
     "no folder": (shutil.rmtree, "data: no such folder"),
     "no transforms": (
         lambda root: [p.unlink() for p in root.glob("*.json")],
-        "neither transforms_train.json nor .* cameras_sphere.npz, nor a COLMAP model",
+        "neither transf.*npz, nor a COLMAP model",
     ),
     "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
     "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
-    "larger image": (
-        picture("train/r_4.png", SIZE, 52, 4),
-        "r_4.png: is 52x48, r_0.png is 48x48, and one lens is stated",
-    ),
-    "neither alpha nor mask": (
-        picture("train/r_4.png", SIZE, SIZE, 3),
-        "r_4.png: has no alpha channel and its frame no",
-    ),
+    "larger image": (picture("train/r_4.png", SIZE, 52, 4), "r_4.png: is 52x48, r_0.png is 48x48, and one lens is"),
+    "neither alpha nor mask": (picture("train/r_4.png", SIZE, SIZE, 3), "r_4.png: has no alpha channel and its frame"),
     "empty masks": (alpha(lambda i: np.zeros((SIZE, SIZE))), "train: every mask is empty"),
     "full masks": (alpha(lambda i: np.ones((SIZE, SIZE))), "train: nothing says where the object is"),
-    "masks of no object": (
-        alpha(lambda i: np.outer(DOWN < 2 + i, DOWN >= SIZE - 2)),
-        "masks and poses contradict each",
-    ),
+    "masks of no object": (alpha(lambda i: np.outer(DOWN < 2 + i, DOWN >= SIZE - 2)), "masks and poses contradict"),
     **{f"radiance {x}": (radiance(x), "r_1.exr: has NaN, infinite or neg") for x in (np.nan, np.inf, -0.5)},
 }
 
@@ -157,13 +143,10 @@ def keys(**content: object) -> Damage:
 
 NERFSTUDIO = {
     "mask of another size": (picture("masks/v03.png.png", SIZE, 8), "v03.png.png: is 8x48, its image v03.png is 48x48"),
-    "mask of another kind": (
-        meta(lambda m: m["frames"][0].update(mask_kind=["depth"]), "transforms.json"),
-        "'mask_kind' must be one of auto, object, ignore",
-    ),
+    "mask of another kind": (keys(mask_kind=["depth"]), "'mask_kind' must be one of auto, object, ignore"),
     "lens without a model": (keys(camera_model="FOV"), "transforms.json: camera model 'FOV' is not read; undistort"),
-    "lens of all sides": (keys(camera_model="EQUIRECTANGULAR"), "camera model 'EQUIRECTANGULAR' is not read"),
     "list of lenses": (keys(camera_model=["OPENCV"]), "is not read"),
+    "a list in words": (keys(val_filenames="images/v03.png"), "'val_filenames' must be a list of images"),
     "decentred fisheye": (keys(camera_model="OPENCV_FISHEYE", p1=0.1), "a fisheye with 'p1' or 'p2' is not read"),
     "fisheye in words": (keys(is_fisheye="true", k1=0.1), "'is_fisheye' must be true or false, got the text 'true'"),
     "coefficient in words": (keys(k1="strong"), "'k1' is no coefficient of a lens: the text 'strong'"),
@@ -215,6 +198,7 @@ def first_camera(model: int, name: str, *parameters: float) -> Damage:
     return cameras(COLMAP_CAMERAS | {1: (model, name, [9, 9], parameters)})
 
 
+TWICE = rewritten("sparse/0/cameras.txt", lambda whole: whole.replace(b"\n7 ", b"\n1 "))
 COLMAP = {
     "another camera model": (first_camera(7, "FOV", 1, 1, 1, 1, 1), "camera model FOV is not read"),
     "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
@@ -314,10 +298,7 @@ MAPS = {
     "bright": (with_texel(2e12), "a.exr: has pixels above 1e.12, whose sums overflow"),
     "upright": (floats(np.ones((8, 4, 3))), "a.exr: is 4x8; an equirectangular map is twice as wide as high"),
     "black": (floats(np.zeros((4, 8, 3))), "a.exr: is black and lights nothing"),
-    **{
-        name: (file(name, PNG), f"{name}: an environment map must hold linear radiance")
-        for name in ("a.png", "a.hdr", "a.exr")
-    },
+    **{name: (file(name, PNG), f"{name}: an environment map must hold linear") for name in ("a.png", "a.hdr", "a.exr")},
     "none": (lambda root: root / "b.hdr", "no such environment map"),
 }
 
@@ -330,16 +311,10 @@ MESHES = {
 }
 TRUTH = {
     "another size": (picture("test/r_0_normal.png", 8, 8, 3), "r_0_normal.png: is 8x8, not the size of r_0.png"),
-    "no alpha": (
-        picture("test/r_0_albedo.png", SIZE, SIZE, 3),
-        "r_0_albedo.png: needs 4 channels, has 3; re-export it",
-    ),
+    "no alpha": (picture("test/r_0_albedo.png", SIZE, SIZE, 3), "r_0_albedo.png: needs 4 channels, has 3; re-export"),
 }
 POINTS_ALONE = trimesh.PointCloud(np.eye(3)).export(file_type="ply")
-AT_THE_START = {
-    "points": (file("mesh.ply", POINTS_ALONE), "mesh.ply: degenerate or empty mesh; replace or rem"),
-    **TRUTH,
-}
+AT_THE_START = {"points": (file("mesh.ply", POINTS_ALONE), "mesh.ply: degenerate or empty mesh; replace"), **TRUTH}
 
 
 # ---- glTF ----
@@ -417,10 +392,7 @@ GLTF = {
     "long accessor": (accessor(count=1000), "an accessor reaches beyond its buffer view"),
     "negative count": (accessor(count=-3), "not valid glTF"),
     "no coordinates": (gltf(texture), "material 'm' has textures, but a mesh with it has no TEXCOORD_0"),
-    "two coordinates": (
-        gltf(lambda g: texture(g, emissiveTexture={"index": 0, "texCoord": 1})),
-        "'m' have different coordinates",
-    ),
+    "two coordinates": (gltf(lambda g: texture(g, emissiveTexture={"index": 0, "texCoord": 1})), "'m' have different"),
     "NaN factor": (gltf(endless_factor), "material 'm' has a factor that is no usable number"),
     "no image": (gltf(broken_image), "image 0 'bad': cannot be read as an image"),
     "no stride": (gltf(lambda g: g.json["bufferViews"][0].update(byteStride=0)), "byteStride"),
@@ -436,10 +408,7 @@ GLTF = {
     "no buffer": (lambda root: beside(root, "gone%20too.bin"), "gone too.bin: no such file, though a.gltf refers"),
     "a pipe": (lambda root: beside(root, "pipe.bin"), "pipe.bin: no such file"),
     **{
-        f"outside by {uri}": (
-            lambda root, uri=uri: beside(root, uri),
-            "a.gltf: refers to .*, outside its folder; put the file there",
-        )
+        f"outside by {uri}": (lambda root, uri=uri: beside(root, uri), "a.gltf: refers to .*, outside its folder")
         for uri in ("../secret.bin", "%2e%2e/secret.bin", "sub/../../secret.bin", "{root}/secret.bin", "link.bin")
     },
 }
@@ -455,7 +424,11 @@ FORMS = {  # what writes a good folder, what reads it or the path that the damag
     "nerfstudio": (lambda root: write_transforms(root, masks=True), LOADED, NERFSTUDIO),
     "view folders": (make_folders, LOADED, VIEW_FOLDERS),
     "COLMAP, binary": (lambda root: write_colmap(root, binary=True), LOADED, COLMAP | BINARY),
-    "COLMAP, text": (lambda root: write_colmap(root, binary=False), LOADED, COLMAP),
+    "COLMAP, text": (
+        lambda root: write_colmap(root, binary=False),
+        LOADED,
+        COLMAP | {"one camera twice": (TWICE, "two cam")},
+    ),
     "NeuS": (write_neus, LOADED, NEUS),
     "image": (write_images, of_file(read_image), IMAGES),
     "map": (Path.exists, of_file(read_environment), MAPS),

@@ -39,17 +39,15 @@ FROM_P3 = np.array(
 
 @pytest.mark.parametrize(("suffix", "name"), [(".png", "wide"), (".jpg", "wide"), (".png", "sRGB")])
 def test_a_colour_profile_is_applied_to_photos_alone(tmp_path, capsys, suffix, name):
-    photo = np.full((16, 16, 3), (180, 130, 90), np.uint8)
-    Image.fromarray(photo).save(tmp_path / f"x{suffix}", icc_profile=wide_profile(name), quality=100, subsampling=0)
+    photo, path = np.full((16, 16, 3), (180, 130, 90), np.uint8), tmp_path / f"x{suffix}"
+    Image.fromarray(photo).save(path, icc_profile=wide_profile(name), quality=100, subsampling=0)
     expected = 255 * linear_to_srgb((FROM_P3 @ srgb_to_linear(np.float32([180, 130, 90]) / 255)).astype(np.float32))
-    assert read_colours(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(expected, abs=2) and abs(expected[0] - 180) > 8
+    assert read_colours(path)[3, 3] == pytest.approx(expected, abs=2) and abs(expected[0] - 180) > 8
     assert "are converted to sRGB" in capsys.readouterr().err
-    assert read_codes(tmp_path / f"x{suffix}")[3, 3] == pytest.approx([180, 130, 90], abs=2)  # a map of numbers
+    assert read_codes(path)[3, 3] == pytest.approx([180, 130, 90], abs=2)  # a map of numbers
     (photo_of,) = find_photographs(tmp_path)
     assert read_upright(photo_of.path)[3, 3] == pytest.approx(expected, abs=2)
-    assert read_plate(tmp_path / f"x{suffix}")[3, 3] == pytest.approx(
-        srgb_to_linear(np.float32(expected) / 255), rel=0.06
-    )
+    assert read_plate(path)[3, 3] == pytest.approx(srgb_to_linear(np.float32(expected) / 255), rel=0.06)
 
 
 def test_a_profile_beside_damaged_exif_is_applied(tmp_path, monkeypatch):
@@ -210,9 +208,7 @@ def test_an_unknown_colour_space_and_an_alpha_are_said(tmp_path, capsys):
     exif = Image.Exif()
     exif.get_ifd(34665)[40961] = 65535
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
-    (tmp_path / "x.png").write_bytes(
-        with_chunk(Image.fromarray(np.zeros((4, 4, 3), np.uint8)), b"cICP", bytes((9, 16, 0, 1)))
-    )
+    (tmp_path / "x.png").write_bytes(with_chunk(Image.new("RGB", (4, 4)), b"cICP", bytes((9, 16, 0, 1))))
     for file, read in (("x.jpg", read_colours), ("x.jpg", read_upright), ("x.png", read_colours)):
         errors._said.clear()
         read(tmp_path / file)

@@ -221,6 +221,15 @@ def test_repairs_are_said(path, capsys):
         "normals of length 0",
     ):
         assert text in said
+    g = triangle()  # compressed, beside what it is made of; with colours of an older kind
+    old = {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.8, 0.1, 0.1, 1]}}
+    packed = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    g.json["meshes"][0]["primitives"][0] |= {"material": g.material(name="old", extensions=old), "extensions": packed}
+    g.json["extensionsUsed"] = [*packed]
+    assert read_asset(g.write(path)).vertices == pytest.approx(z_up(TRIANGLE))
+    said = capsys.readouterr().err
+    assert "uses KHR_draco_mesh_compression, KHR_materials_pbrSpecularGlossiness; left out" in said
+    assert "the colours of 'old', specular and glossiness, are not read; drawn as white metal" in said
     gltf = Gltf()
     clear = {"KHR_materials_transmission": {}}  # which the file does not declare
     material = gltf.material(name="glass", alphaMode="BLEND", extensions=clear)

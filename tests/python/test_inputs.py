@@ -8,6 +8,7 @@ import OpenImageIO as oiio
 import pytest
 from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, write_exr
 from PIL import Image
+from splitnerf import errors
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import has_test_split
@@ -48,10 +49,9 @@ FORMS = {
     "sixteen bits, one": png(DISC * np.uint16(1)),
     "alpha": rgba(np.full_like(DISC, 255, np.uint8), 255 * DISC),
     "black with alpha": rgba(np.zeros_like(DISC, np.uint8), 255 * DISC),
-    "cut-out": png(
-        np.dstack([np.random.default_rng(0).integers(0, 255, (*DISC.shape, 3), np.uint8), 255 * DISC.astype(np.uint8)])
-    ),
+    "cut-out": png(np.dstack([np.arange(243, dtype=np.uint8).reshape(9, 9, 3), 255 * DISC.astype(np.uint8)])),
     "opaque": rgba(255 * DISC, np.full_like(DISC, 255, np.uint8)),
+    "colour, nearly grey": png(np.stack([255 * DISC, 255 * DISC, 250 * DISC], 2).astype(np.uint8)),
     "palette": palette(DISC, (0, 0, 0), (128, 0, 0)),
     "palette, white first": palette(~DISC, (255, 255, 255), (0, 0, 0)),
     "palette, red first": palette(~DISC, (128, 0, 0), (0, 0, 0)),
@@ -75,6 +75,8 @@ def test_a_soft_mask_stays_as_it_is(tmp_path):
     assert np.array_equal(read_mask(tmp_path / "mask.png")[..., 0], soft)
     png(DISC * np.uint8(3)).save(tmp_path / "dark.jpg", quality=30)  # its values are not exact
     assert read_mask(tmp_path / "dark.jpg").max() < 32
+    png(large := np.kron(DISC, np.ones((9, 9))) > 0).save(tmp_path / "lossy.webp", quality=30)
+    assert np.array_equal(read_mask(tmp_path / "lossy.webp")[..., 0] > 127, large)
     for value, expected in ((0, 0), (255, 255), (7, 255)):
         png(np.full((9, 9), value, np.uint8)).save(tmp_path / "mask.png")
         assert (read_mask(tmp_path / "mask.png") == expected).all()
@@ -111,10 +113,15 @@ def test_channels_are_found_by_their_names(tmp_path, capsys, names):
         assert read_radiance(tmp_path / "x.exr")[0, 0] == pytest.approx(expected[:3])
 
 
-def test_an_image_of_luminance_and_differences_of_colours_is_refused(tmp_path):
+def test_an_image_of_luminance_and_differences_of_colours_is_refused(tmp_path, capsys):
     write_exr(tmp_path / "x.exr", np.ones((4, 4, 3), np.float32), ("Y", "RY", "BY"))
     with pytest.raises(InputError, match=r"x.exr: holds luminance .*; re-export it as R, G, B"):
         read_image(tmp_path / "x.exr")
+    for names, is_said in (("RB", True), ("Z", True), ("Y", False)):
+        errors._said.clear()
+        write_exr(tmp_path / "x.exr", np.ones((4, 4, len(names)), np.float32), tuple(names))
+        read_image(tmp_path / "x.exr")
+        assert ("images without channels R, G, B or Y" in capsys.readouterr().err) == is_said
 
 
 def test_the_layer_that_is_named_as_a_picture_is_taken(tmp_path):
@@ -128,15 +135,13 @@ def test_the_layer_that_is_named_as_a_picture_is_taken(tmp_path):
 def test_the_part_with_colours_is_the_picture(tmp_path, capsys, names):
     other, colours = oiio.ImageSpec(5, 4, 3, "float"), oiio.ImageSpec(5, 4, 3, "float")
     other.channelnames = ("Z", "U", "V") if names[0] == "depth" else ("R", "G", "B")
-    parts = ((other, np.full((4, 5, 3), 7)), (colours, np.full((4, 5, 3), 0.25)))
+    parts = ((other, np.full((4, 5, 3), 7, "f4")), (colours, np.full((4, 5, 3), 0.25, "f4")))
     for name, (spec, _) in zip(names, parts):
         spec.attribute("name", name)
     sink = oiio.ImageOutput.create("x.exr")
     assert sink.open(str(tmp_path / "x.exr"), (other, colours))
     for i, (spec, pixels) in enumerate(parts):
-        assert (i == 0 or sink.open(str(tmp_path / "x.exr"), spec, "AppendSubimage")) and sink.write_image(
-            np.float32(pixels)
-        )
+        assert (i == 0 or sink.open(str(tmp_path / "x.exr"), spec, "AppendSubimage")) and sink.write_image(pixels)
     sink.close()
     assert read_header(tmp_path / "x.exr").channels == 3 and (read_image(tmp_path / "x.exr") == 0.25).all()
     assert "of images with several parts one is used (x.exr: part 2)" in capsys.readouterr().err
@@ -156,18 +161,19 @@ def test_a_part_of_an_image_lies_where_its_window_says(tmp_path, left, top):
 def test_an_orientation_is_said(tmp_path, capsys):
     exif = Image.Exif()
     exif[274] = 3
-    png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "x.jpg", exif=exif)
-    read_colours(tmp_path / "x.jpg")
-    assert "state an EXIF orientation; their pixels are used as they are stored (x.jpg: 3)" in capsys.readouterr().err
+    for name, read in (("x.jpg", read_colours), ("x.png", read_mask)):
+        errors._said.clear()
+        png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / name, exif=exif)
+        read(tmp_path / name)
+        said = capsys.readouterr().err
+        assert f"state an EXIF orientation; their pixels are used as they are stored ({name}: 3)" in said
 
 
 @pytest.mark.parametrize("exposures", [(), (2.0,), (4.0, 0.5)])
 def test_the_exposures_of_a_radiance_file_are_divided_out(tmp_path, capsys, exposures):
     write_image(tmp_path / "x.hdr", np.full((8, 16, 3), 0.5, np.float32))
     whole = (tmp_path / "x.hdr").read_bytes()
-    lines = "".join(f"EXPOSURE={value}\n" for value in exposures).encode() + (
-        b"GAMMA=2.2\n" if exposures else b"GAMMA=1\n"
-    )
+    lines = "".join(f"EXPOSURE={x}\n" for x in exposures).encode() + (b"GAMMA=2.2\n" if exposures else b"GAMMA=1\n")
     (tmp_path / "x.hdr").write_bytes(whole.replace(b"FORMAT=", lines + b"FORMAT=", 1))
     assert read_radiance(tmp_path / "x.hdr") == pytest.approx(0.5 / np.prod(exposures), rel=0.01)
     assert ("the GAMMA of maps are not used (x.hdr)" in capsys.readouterr().err) == bool(exposures)
@@ -231,7 +237,7 @@ LISTS = [
 
 
 @pytest.mark.parametrize(("lists", "train", "test"), LISTS)
-def test_what_any_list_holds_out_is_held_out(tmp_path, lists, train, test):
+def test_what_any_list_holds_out_is_held_out(tmp_path, capsys, lists, train, test):
     make_blender(tmp_path, train=6, test=1)
     content = json.loads((tmp_path / "transforms_train.json").read_text())
     files = [frame["file_path"] for frame in content["frames"]]
@@ -241,6 +247,9 @@ def test_what_any_list_holds_out_is_held_out(tmp_path, lists, train, test):
         (tmp_path / f"transforms_{split}.json").unlink()
     names = {f"r_{i}": i for i in range(6)}
     assert {names[name] for name in load_dataset(tmp_path).frame_names} == train
+    assert ("images are in no list of the splits, and not used" in capsys.readouterr().err) == (
+        "train_filenames" in lists
+    )
     assert has_test_split(tmp_path) == (test is not None)
     if test is not None:
         assert {names[name] for name in load_dataset(tmp_path, "test").frame_names} == test
@@ -266,9 +275,11 @@ def test_images_of_other_files_and_names_without_a_frame_are_said(tmp_path, caps
     write_image(tmp_path / "masks/a.png", np.ones((4, 4)))
     assert transforms.read(tmp_path, None)[1].mask_path is None
     assert "masks: no frame has a mask there; 'mask_path' of a frame would name it" in capsys.readouterr().err
-    lists = {"test_filenames": ["train\\r_1.png", "train/r_9.png"]}
+    lists = {"test_filenames": ["train\\r_1.png", "train/r_9.png", "train/u\u0308.png"]}
+    content["frames"][5]["file_path"] = "train/\u00fc.png"
+    (tmp_path / "train/r_5.png").rename(tmp_path / "train/\u00fc.png")
     (tmp_path / "transforms.json").write_text(json.dumps(content | lists))
-    assert "r_1" not in load_dataset(tmp_path).frame_names
+    assert load_dataset(tmp_path).frame_names == ["r_0", "r_2", "r_3", "r_4"]
     assert "lists of the splits name 1 images that no frame has (train/r_9)" in capsys.readouterr().err
 
 
@@ -296,7 +307,7 @@ def test_rounded_poses_become_rotations(capsys):
         checked_pose((pose * np.diag([1.01, 1, 1, 1])).tolist(), "x")
 
 
-def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
+def test_names_are_found_in_the_forms_of_other_systems(tmp_path, capsys):
     (tmp_path / "a").mkdir()
     for name in ("a/u\u0308ber.png", "a/b.PNG", "a/c.JPG"):
         (tmp_path / name).write_bytes(b"")
@@ -304,6 +315,13 @@ def test_names_are_found_in_the_forms_of_other_systems(tmp_path):
     for listed, expected in names.items():
         assert listed_image(tmp_path, listed, Path("t")).samefile(tmp_path / expected)
     assert listed_file(tmp_path, "a\\b.PNG", Path("t")).samefile(tmp_path / "a/b.PNG")
+    assert not capsys.readouterr().err
+    (tmp_path / "a/b.jpg").write_bytes(b"")
+    assert (
+        listed_image(tmp_path, "a/b", Path("t"), [tmp_path / "a/b.jpg"]).name == "b.PNG" and not capsys.readouterr().err
+    )
+    assert listed_image(tmp_path, "a/b", Path("t")).name == "b.PNG"
+    assert "images of one name differ in their suffixes; the first one is read (b.PNG)" in capsys.readouterr().err
 
 
 def test_a_mask_is_no_photo(tmp_path):
@@ -387,8 +405,9 @@ def test_keys_that_are_not_used_are_named(tmp_path, capsys):
     edit(tmp_path, lambda meta: meta.update(k1=0.1, camera_type="orthographic"))
     assert len(transforms.read_camera_path(tmp_path / "transforms_train.json")) == 6
     said = capsys.readouterr().err
-    assert "has lenses that distort; drawn as pinholes" in said
-    assert "not used: aabb_scale, applied_scale, camera" in said
+    assert (
+        "has lenses that distort; drawn as pinholes" in said and "not used: aabb_scale, applied_scale, camera" in said
+    )
 
 
 def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tmp_path, capsys):
@@ -401,8 +420,16 @@ def test_a_lens_that_is_stated_twice_and_a_mask_without_an_object_are_told_of(tm
     write_image(tmp_path / "train/r_4.png", np.zeros((SIZE, SIZE, 4)))
     load_dataset(tmp_path)
     said = capsys.readouterr().err
-    assert "'fl_x' and 'camera_angle_x' contradict each other; 'fl_x' counts (r_0.png)" in said
+    what = "'fl_x' and 'camera_angle_x' contradict each other; 'fl_x' counts"
+    assert f"{what} (r_0.png: {SIZE} pixels, they agree for {1.1 * SIZE:.0f})" in said
     assert "masks of 1 photos are empty; training takes the object to be nowhere in them (r_4.png)" in said
+    edit(tmp_path, lambda meta: meta.pop("camera_angle_x"))
+    load_dataset(tmp_path)
+    said = capsys.readouterr().err
+    assert (
+        f"in pixels are stated without 'w' and 'h'; they are taken for those of the photos as they are (r_0.png: {SIZE}x"
+        in said
+    )
 
 
 def test_an_alpha_that_was_multiplied_in_is_told_of(tmp_path, capsys):

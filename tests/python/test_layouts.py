@@ -52,9 +52,7 @@ def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
 
 def test_of_two_forms_of_a_model_the_binary_one_is_read(tmp_path, capsys):
     for binary, focal in ((False, 60.0), (True, 70.0)):
-        write_colmap(
-            tmp_path, binary=binary, cameras={1: (0, "SIMPLE_PINHOLE", [SIZE] * 2, [focal, SIZE / 2, SIZE / 2])}
-        )
+        write_colmap(tmp_path, binary=binary, cameras={1: (0, "SIMPLE_PINHOLE", [SIZE] * 2, [focal, 24, 24])})
     assert load_dataset(tmp_path).intrinsics[0, 0] == 70
     assert "sparse/0: has a model as text and as binary files; the binary ones are read" in capsys.readouterr().err
 
@@ -130,9 +128,8 @@ def test_images_in_folders_have_their_masks_in_folders(tmp_path, binary):
 )
 @pytest.mark.parametrize("binary", [True, False])
 def test_each_camera_model_of_colmap(tmp_path, binary, number, name, parameters, expected):
-    frames, _ = read_frames(
-        write_colmap(tmp_path, binary=binary, cameras={1: (number, name, [SIZE, SIZE], parameters)}), "train"
-    )
+    cameras = {1: (number, name, [SIZE, SIZE], parameters)}
+    frames, _ = read_frames(write_colmap(tmp_path, binary=binary, cameras=cameras), "train")
     bent = frames[0].distortion
     assert tuple(lens_intrinsics(frames[0].lens, (SIZE, SIZE))) == pytest.approx(expected[0])
     assert (bent.radial, bent.tangential, bent.fisheye) == expected[1:]
@@ -142,9 +139,7 @@ def test_each_camera_model_of_colmap(tmp_path, binary, number, name, parameters,
 
 
 def names(root, mode: str) -> tuple[list[str], list[str]]:
-    return tuple(
-        [frame.name for frame in read_frames(root, split, Reading(eval_mode=mode))[0]] for split in ("train", "test")
-    )
+    return tuple([frame.name for frame in read_frames(root, split, Reading(mode))[0]] for split in ("train", "test"))
 
 
 def test_eval_modes_of_one_list(tmp_path):
@@ -175,9 +170,7 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("path", "split"), [(f"{x}.png", split) for split, all_ in WORDS.items() for x in all_.split()]
-)
+@pytest.mark.parametrize(("path", "split"), [(f"{x}.png", split) for split, s in WORDS.items() for x in s.split()])
 def test_words_in_paths(tmp_path, path, split):
     root = write_transforms(tmp_path / "train")  # the folder's own name does not count
     write_image(root / path, np.ones((SIZE, SIZE, 4)))
@@ -269,9 +262,7 @@ def test_the_numbers_of_a_file_are_brought_to_the_size_of_a_frame(tmp_path, file
     frames = [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()} | frame]
     (tmp_path / "transforms.json").write_text(json.dumps(file | {"frames": frames}))
     if expected is None:
-        with pytest.raises(
-            InputError, match=r"frame 0 \(a.png\): is 60x120 and .* is of 120x60; give the frame its own"
-        ):
+        with pytest.raises(InputError, match=r"frame 0 \(a.png\): is 60x120 and .* is of 120x60; give the frame its"):
             transforms.read(tmp_path, None)
     else:
         (read,) = transforms.read(tmp_path, None)

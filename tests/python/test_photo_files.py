@@ -38,8 +38,7 @@ def test_files_tell_of_turns_and_exposures(tmp_path):
     assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
     assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
     assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
-    assert first.exposure == pytest.approx(0.25)
-    assert second.exposure is None
+    assert first.exposure == pytest.approx(0.25) and second.exposure is None
 
 
 def test_damaged_exif_costs_no_photo(tmp_path):
@@ -120,7 +119,11 @@ def test_the_sharpest_frames_of_a_video(tmp_path):
     assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
 
 
-@pytest.mark.parametrize(("box", "is_told"), [(b"colrnclx\0\x09\0\x12", 1), (b"colrnclc\0\x01\0\x01", 0)])
+MP4, MATROSKA = b"colrncl%c\0%c\0%c", b"\x55\xb0\x8f\x55\xb1\x81%c\x55\xba\x81%c"
+BRIGHT, USUAL = [MP4 % (b"x", 9, 18), MATROSKA % (9, 16), MATROSKA % (9, 18)], [MP4 % (b"c", 1, 1), MATROSKA % (1, 1)]
+
+
+@pytest.mark.parametrize(("box", "is_told"), [*((box, 1) for box in BRIGHT), *((box, 0) for box in USUAL)])
 def test_a_video_of_high_range_is_told_of(tmp_path, capsys, box, is_told):
     """As phones film by default, in hybrid log-gamma."""
     write_video(tmp_path / "v.mp4", [np.full((240, 320, 3), 20, np.uint8)], "mp4v")

@@ -280,9 +280,7 @@ def load_dataset(
     poses[:, :3, 3] = poses[:, :3, 3] @ box_from_world[:3, :3].T + box_from_world[:3, 3]
     whole, behind_paths = all(photo.whole for photo in photos), [_behind_path(frame, root, reading) for frame in frames]
     if any(frame.behind_path for frame in frames) and not whole:
-        note_once(
-            f"{root}: 'behind_path' is not used: the photos have an alpha of their own, or --downscale averages them"
-        )
+        note_once(f"{root}: 'behind_path' is not used: the photos have their own alpha, or --downscale averages them")
     return Dataset(
         name=root.resolve().name,
         root=root,
@@ -411,7 +409,7 @@ def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Phot
             raise error from None
         note_once(ignoring.format("masks of the object would contradict the poses"))
         return photos, box_from_world, "ignore"
-    what = f"taken for the object's, white on {kept:.0%} of the photos"
+    what = f"taken for the object's, which covers {kept:.0%} of the photos"
     note_once(f"{root}: its mask files are {what}; --mask-kind ignore if black is only to be ignored")
     return photos, box_from_world, "object"
 

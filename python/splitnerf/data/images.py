@@ -53,7 +53,7 @@ def read_image(path: str | os.PathLike) -> np.ndarray:
 
 def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
     """Reads an image like `read_image`, but the values of 8- and 16-bit files as they are stored: uint8 or uint16. Messages
-    name it `name`, by default the path."""
+    name it `name`, by default the path. Notes say what a file states that is not used."""
     path = Path(path)
     name = name or str(path)
     with _opened(path, name) as (source, spec):
@@ -66,10 +66,14 @@ def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
         if len(kept) < spec.nchannels:
             others = [channel for i, channel in enumerate(spec.channelnames) if i not in kept]
             if {"RY", "BY"} <= set(others):
-                raise InputError(
-                    f"{name}: holds luminance and differences of colours (Y, RY, BY); re-export it as R, G, B"
-                )
+                raise InputError(f"{name}: holds luminance and colour differences (Y, RY, BY); re-export it as R, G, B")
             note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
+        elif source.format_name() == "openexr" and not _named_channels(spec):
+            what = "images without channels R, G, B or Y: theirs count as grey or colours, and alpha"
+            note_once(f"{path.parent}: {what}", f"{path.name}: {', '.join(spec.channelnames)}")
+        if (turn := spec.getattribute("Orientation") or 1) != 1 and source.format_name() != "hdr":
+            what = "images state an EXIF orientation; their pixels are used as they are stored"
+            note_once(f"{path.parent}: {what}", f"{path.name}: {turn}")
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
         primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None
@@ -88,15 +92,8 @@ def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
 
 def read_colours(path: str | os.PathLike) -> np.ndarray:
     """Reads a photo like `read_codes`, and brings the colours of 8- and 16-bit files to sRGB from what the file states, see
-    :func:`splitnerf.data.colours.to_srgb`. A note says that its orientation is not used."""
-    path = Path(path)
-    with _opened(path, str(path)) as (source, spec):
-        stated = {attribute.name: attribute.value for attribute in spec.extra_attribs}
-        is_turned = stated.get("Orientation", 1) != 1 and source.format_name() != "hdr"
-    pixels = read_codes(path)
-    if is_turned:
-        turned = f"{path.name}: {stated['Orientation']}"
-        note_once(f"{path.parent}: photos state an EXIF orientation; their pixels are used as they are stored", turned)
+    :func:`splitnerf.data.colours.to_srgb`."""
+    pixels = read_codes(path := Path(path))
     if pixels.dtype.kind == "f":
         return pixels
     n_colours = 3 if pixels.shape[2] >= 3 else 1

@@ -51,6 +51,7 @@ PEAK, BRIGHT = 0.9, 0.999  # a photo of floats is kept so that a share of BRIGHT
 RINGING = 0.1  # of the brightest value; a filter leaves so much below 0 at an edge
 LEAST_ALPHA = 0.01
 FAINT, FEW = 0.25, 20  # alpha below which colours tell whether they are straight, and how many pixels tell nothing
+GREY = 0.03  # difference of a mask's channels, of their largest value, that compression leaves
 WHITE = 0.98  # least part of full scale that a mask should have somewhere
 
 MOST_LABELS = 32  # number and size of values up to which a mask of more than two of them may be one of labels
@@ -112,9 +113,14 @@ def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | N
             what = "colours never exceed a faint alpha, as where it was multiplied into them; save straight alpha"
             note_once(f"{path.parent}: {what}", path.name)
     if frame.mask_path is not None and is_object:
-        alpha = read_mask(frame.mask_path)
-        if 0 < (brightest := float(decoded(alpha.max()))) < WHITE:
+        mask = read_mask(frame.mask_path)
+        darkest, brightest = (float(decoded(value)) for value in (mask.min(), mask.max()))
+        if 0 < brightest < WHITE:
             note_once("masks that are nowhere white make the object clear", f"{frame.mask_path.name}: {brightest:.1%}")
+        if darkest == 1 and alpha is not None and alpha.min() < alpha.max():
+            note_once("where a mask is white everywhere the photo's own alpha counts", frame.mask_path.name)
+        else:
+            alpha = mask
     elif frame.mask_path is not None:
         known = read_mask(frame.mask_path) > 0
     if frame.dynamic_mask_path is not None:
@@ -179,8 +185,7 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bo
             mask = read_header(mask_path)
             if mask[:2] != (height, width):
                 raise InputError(
-                    f"{mask_path}: is {mask.width}x{mask.height}, its image {path.name} is {width}x{height}; make them the "
-                    "same size"
+                    f"{mask_path}: is {mask.width}x{mask.height}, its image {path.name} is {width}x{height}; make them equal"
                 )
             exact = exact and mask.bits == 8
         if frame.behind_path is not None:
@@ -204,7 +209,8 @@ def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> 
             angle = frame.lens.get(f"camera_angle_{axis}", 2 * np.arctan(0.5 * extent / focal))
             if abs(2 * focal * np.tan(0.5 * angle) - extent) > ANGLES_ALIKE * extent:
                 what = f"'fl_{axis}' and 'camera_angle_{axis}' contradict each other; 'fl_{axis}' counts"
-                note_once(f"{frame.image_path.parent}: {what}", frame.image_path.name)
+                fitting = f"{extent} pixels, they agree for {2 * focal * np.tan(0.5 * angle):.0f}"
+                note_once(f"{frame.image_path.parent}: {what}", f"{frame.image_path.name}: {fitting}")
         if not all(1 / 3 < share < 2 / 3 for share in (x / width, y / height)):
             what = f"({x:.0f}, {y:.0f}) in {width}x{height} pixels"
             note_once(
@@ -213,6 +219,9 @@ def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> 
             )
         if "w" in frame.lens:
             continue
+        if frame.lens.keys() <= {"fl_x", "fl_y"}:
+            what = "focal lengths in pixels are stated without 'w' and 'h'; they are taken for those of the photos as they are"
+            note_once(f"{frame.image_path.parent}: {what}", f"{frame.image_path.name}: {width}x{height}")
         j = first.setdefault(str(sorted(frame.lens.items())), i)
         same_shape = abs(width * sizes[j][0] - height * sizes[j][1]) < max(*sizes[j], height, width)
         in_pixels = frame.lens.keys() & {"fl_x", "fl_y", "cx", "cy"}
@@ -298,19 +307,17 @@ def read_mask(path: Path) -> np.ndarray:
         mask = alpha
     elif (entries := _palette_entries(path)) is not None:
         mask = entries[..., None]
-    elif pixels.shape[2] >= 3 and (pixels[..., :3] != pixels[..., :1]).any():
+    elif pixels.shape[2] >= 3 and np.ptp(pixels[..., :3], axis=2).max() > GREY * pixels[..., :3].max():
         raise InputError(f"{path}: is coloured, which no mask is; save the object as white on black")
     else:
         mask = pixels[..., :1]
-    if mask.dtype.kind == "f" or path.suffix.lower() in (".jpg", ".jpeg"):  # whose values are not exact
+    if mask.dtype.kind == "f" or path.suffix.lower() in (".jpg", ".jpeg", ".webp"):  # whose values are not exact
         return mask
     values, most = np.flatnonzero(np.bincount(mask.ravel())), np.iinfo(mask.dtype).max
     if len(values) == 2:
         return np.where(mask == values[1], most, 0).astype(mask.dtype)
     if 2 < len(values) <= MOST_LABELS and (values[-1] < MOST_LABELS or _share_between(mask) > LABELLED):
-        raise InputError(
-            f"{path}: holds the labels {', '.join(map(str, values))}; save the object's alone, as white on black"
-        )
+        raise InputError(f"{path}: holds the labels {', '.join(map(str, values))}; save the object's in white on black")
     return mask if values[0] == 0 or len(values) > 2 else np.full_like(mask, most)
 
 

@@ -23,7 +23,8 @@ COMMON = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp")
 HEIC = (".heic", ".heif")
 HEIC_BRANDS = (b"ftypheic", b"ftypheix", b"ftypmif1")
 OTHER = (".avif", ".gif", ".jp2", ".jxl", ".exr", ".hdr")
-HIGH_RANGE = rb"(?s)colrncl[cx]..\0[\x10\x12]"  # in an MP4: its curve is PQ or HLG, by the numbers of ITU-T H.273
+# In an MP4, and in a Matroska or WebM file: its curve is PQ or HLG, by the numbers of ITU-T H.273.
+HIGH_RANGE = rb"(?s)colrncl[cx]..\0[\x10\x12]|\x55\xb0.{1,99}?\x55\xba\x81[\x10\x12]"
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 WHOLE = 0.95  # share of the frames that a video states which a whole one has
@@ -150,9 +151,7 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
         raise InputError(f"{video}: is no video that can be read; convert it to mp4, or give a folder of photos")
     with open(video, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         if re.search(HIGH_RANGE, content):
-            note(
-                f"{video}: is a video of high dynamic range (HLG or PQ), and read as if it was sRGB; convert it to SDR"
-            )
+            note(f"{video}: is a video of high dynamic range (HLG or PQ), read as if it was sRGB; convert it")
     best, most, window = None, -1.0, 0
     for number in range(total + 1):
         read, frame = reader.read() if number < total else (False, None)

@@ -133,6 +133,8 @@ def _read_material(document: Document, index: int | None) -> tuple[Material, Tex
     source = document.json["materials"][index]
     name = source.get("name", f"material {index}")
     pbr = source.get("pbrMetallicRoughness", {})
+    if not pbr and "KHR_materials_pbrSpecularGlossiness" in source.get("extensions", {}):
+        note(f"{document.path}: the colours of '{name}', specular and glossiness, are not read; drawn as white metal")
     if source.get("alphaMode", "OPAQUE") != "OPAQUE":
         note(f"{document.path}: material '{name}' is transparent (alphaMode {source['alphaMode']}); drawn opaque")
     slots = TextureSlots(document, name)

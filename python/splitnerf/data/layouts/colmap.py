@@ -46,16 +46,16 @@ def read(root: Path, split: None = None) -> list[Frame]:
     """The registered images, by name. Raises InputError where the model or an image cannot be used."""
     cameras_file, source = _model_files(root)
     with _opened(cameras_file) as file:
-        cameras = {number: _lens_numbers(*camera, cameras_file) for number, *camera in _cameras(file)}
+        listed = [(number, _lens_numbers(*camera, cameras_file)) for number, *camera in _cameras(file)]
+    if len(cameras := dict(listed)) < len(listed):
+        raise InputError(f"{cameras_file}: has two cameras of one number; replace the model")
     with _opened(source) as file:
         images = sorted(_images(file))
     lenses, frames = {}, []
     for name, camera, motion in images:
         if camera not in lenses:
             if camera not in cameras:
-                raise InputError(
-                    f"{source}: image {name!r} has camera {camera}, which the model lacks; replace the model"
-                )
+                raise InputError(f"{source}: image {name!r} has camera {camera}, which the model lacks; replace it")
             lenses[camera] = read_lens(cameras[camera], f"{cameras_file}: camera {camera}")
         image = listed_image(root / IMAGES, name, source)
         pose = checked_pose(_camera_to_world(motion), f"{source}: the pose of {name!r}")
@@ -96,13 +96,10 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
                     if folder in found:
                         note_once(f"{folder}: has a model as text and as binary files; the binary ones are read")
                     found[folder] = files
-    if not found:
-        return None
-    largest = (
-        next(iter(found)) if len(found) == 1 else max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
-    )
-    if len(found) > 1:
-        note_once(f"{root}: has {len(found)} COLMAP models; the one with the most images is read", str(largest))
+    if len(found) < 2:
+        return next(iter(found.values()), None)
+    largest = max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
+    note_once(f"{root}: has {len(found)} COLMAP models; the one with the most images is read", str(largest))
     return found[largest]
 
 
@@ -162,9 +159,7 @@ def _lens_numbers(model: str, width: int, height: int, parameters: tuple[float, 
             f"image_undistorter`, or use one of {', '.join(MODELS)}"
         )
     if len(names) != len(parameters):
-        raise InputError(
-            f"{path}: a camera {model} has {len(parameters)} parameters, not {len(names)}; replace the model"
-        )
+        raise InputError(f"{path}: a camera {model} has {len(parameters)} parameters, not {len(names)}; replace it")
     return dict(zip(names, parameters)) | {"camera_model": model, "w": width, "h": height}
 
 

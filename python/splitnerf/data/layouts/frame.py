@@ -97,10 +97,11 @@ def listed_image(folder: Path, name: str, source: Path, others: Sequence[Path | 
     found = [(given, path) for given in candidates for form in forms(given) if os.path.isfile(path := folder / form)]
     found.sort(key=lambda pair: pair[0] != name and pair[1] in others)
     if found and (found[0][0] == name or found[0][1] not in others or read_header(found[0][1]).channels in (2, 4)):
+        if found[0][0] != name and any(not path.samefile(found[0][1]) and path not in others for _, path in found):
+            note_once(f"{folder}: images of one name differ in their suffixes; the first one is read", found[0][1].name)
         return listed_file(folder, found[0][0], source)
     raise InputError(
-        f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add the image or remove the "
-        "frame"
+        f"{folder / name}: no such image, with or without a suffix, though {source.name} lists it; add it or remove the frame"
     )
 
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Set
 from pathlib import Path
+from unicodedata import normalize
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from splitnerf.errors import InputError, note_once, shown
 
 SINGLE = "transforms.json"
 SPLITS = {"train": ("train_filenames",), "test": ("test_filenames", "val_filenames")}
+LISTS = [key for keys in SPLITS.values() for key in keys]
 FOCAL = ("camera_angle_x", "camera_angle_y", "fl_x", "fl_y")
 LENS = ("cx", "cy", "w", "h", "camera_model", "is_fisheye", *RADIAL, *TANGENTIAL)
 SMALLEST_EXPOSURE = 1e-4
@@ -45,18 +47,10 @@ LARGEST_GAMMA = 5.0
 OTHER_LENSES = ("ftheta_p1", "latlong", "equirectangular", "rolling_shutter", "k5", "k6", "b1", "b2", "skew")
 # Keys that are used, or say nothing of pictures or cameras.
 OF_BOTH = {*FOCAL, *LENS, *OTHER_LENSES, "mask_kind", "gamma"}
-OF_FILE = OF_BOTH | {"frames", "train_filenames", "test_filenames", "val_filenames"}
+OF_FILE = OF_BOTH | {"frames", *LISTS}
 # The last three: a number of Blender's script, and two of instant-ngp's and nerfstudio's.
 OF_FRAME = OF_BOTH | {
-    "file_path",
-    "transform_matrix",
-    "light_rotation",
-    "mask_path",
-    "behind_path",
-    "exposure",
-    "rotation",
-    "sharpness",
-    "colmap_im_id",
+    *"file_path transform_matrix light_rotation mask_path behind_path exposure rotation sharpness colmap_im_id".split()
 }
 
 
@@ -118,17 +112,17 @@ def _own_splits(root: Path) -> list[str]:
 
 def _has_lists(meta: dict) -> bool:
     """Whether a single file says which of its frames are of a split."""
-    return any(isinstance(meta.get(key), list) and meta[key] for keys in SPLITS.values() for key in keys)
+    return any(meta.get(key) for key in LISTS)
 
 
 def _listed(meta: dict, key: str) -> set[str]:
     """The images that a list of a file names."""
-    return {_image(name) for name in meta[key]} if isinstance(meta.get(key), list) else set()
+    return {_image(name) for name in meta.get(key) or ()}
 
 
 def _image(name: object) -> str:
     """The image that a file lists, however its path is written and without its suffix."""
-    path, suffix = os.path.splitext(os.path.normpath(str(name).replace("\\", "/")))
+    path, suffix = os.path.splitext(os.path.normpath(normalize("NFC", str(name).replace("\\", "/"))))
     return path if suffix.lower() in LDR_SUFFIXES + HDR_SUFFIXES else path + suffix
 
 
@@ -165,9 +159,11 @@ def _frames(path: Path, split: str | None, held_out: Set[str] = frozenset()) -> 
     _name_unused(meta, entries, path)
     names = [_image(entry.get("file_path")) for entry in entries]
     chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split)
-    listed = set().union(*(_listed(meta, key) for keys in SPLITS.values() for key in keys))
+    listed = set().union(*(_listed(meta, key) for key in LISTS))
     if unknown := sorted(listed - {*names}):
         note_once(f"{path}: lists of the splits name {len(unknown)} images that no frame has", unknown[0])
+    if split and _listed(meta, "train_filenames") and (others := sorted({*names} - listed)):
+        note_once(f"{path}: {len(others)} images are in no list of the splits, and not used", others[0])
     kept = [i for i, name in enumerate(names) if chosen(name)]
     if held_out & {names[i] for i in kept}:
         rest = [i for i in kept if names[i] not in held_out]
@@ -197,6 +193,9 @@ def read_entries(path: Path) -> tuple[dict, list[dict]]:
         raise InputError(f"{path}: 'frames' must be a list of objects; repair it")
     if not entries:
         raise InputError(f"{path}: has no frames; add posed images")
+    for key in LISTS:
+        if not isinstance(meta.get(key), (list, type(None))):
+            raise InputError(f"{path}: '{key}' must be a list of images; repair it")
     return meta, entries
 
 
@@ -213,7 +212,7 @@ def read_frame(entry: dict, meta: dict, index: int, path: Path) -> Frame:
     mask_kind = entry.get("mask_kind", meta.get("mask_kind", "auto"))
     if mask_kind not in MASK_KINDS:
         raise InputError(
-            f"{path}: 'mask_kind' must be one of {', '.join(MASK_KINDS)}, got {str(mask_kind)[:40]!r}; repair it"
+            f"{path}: 'mask_kind' must be one of {', '.join(MASK_KINDS)}, got {shown(mask_kind)}; repair it"
         )
     return Frame(
         image_path.stem,
@@ -281,12 +280,10 @@ def _lens_numbers(entry: dict, meta: dict, where: str) -> dict:
     axes, axes_of_file = ({key[-1] for key in of if key in FOCAL} for of in (own, shared))
     if axes:  # an axis without a number of its own is as the other, unless the file says how they differ
         dropped = {key for key in FOCAL if axes & {key[-1], *axes_of_file}}
-        ratio = [shared.get(key) for key in ("fl_x", "fl_y")]
+        x, y = (shared.get(key) for key in ("fl_x", "fl_y"))
         shared = {key: value for key, value in shared.items() if key not in dropped}
-        if len(axes) == 1 and _are_positive(*ratio, focal := own.get(f"fl_{min(axes)}")):
-            own["fl_y" if "x" in axes else "fl_x"] = focal * (
-                ratio[1] / ratio[0] if "x" in axes else ratio[0] / ratio[1]
-            )
+        if len(axes) == 1 and _are_positive(x, y, focal := own.get(f"fl_{min(axes)}")):
+            own["fl_y" if "x" in axes else "fl_x"] = focal * (y / x if "x" in axes else x / y)
     width, height, w, h = own.get("w"), own.get("h"), shared.get("w"), shared.get("h")
     if not _are_positive(width, height, w, h) or (width, height) == (w, h):
         return shared | own
