@@ -122,10 +122,7 @@ TRANSFORMS = {
     "no text": (file("transforms_train.json", b"\xff\xfe"), "transforms_train.json: is not valid json"),
     "deep json": (file("transforms_train.json", b"[" * 100_000), "transforms_train.json: is not valid json"),
     "no folder": (shutil.rmtree, "data: no such folder"),
-    "no transforms": (
-        lambda root: [p.unlink() for p in root.glob("*.json")],
-        "neither transf.*npz, nor a COLMAP model",
-    ),
+    "no transforms": (lambda root: [p.unlink() for p in root.glob("*.json")], "neither transf.*npz, nor a COLMAP mod"),
     "missing image": (lambda root: (root / "train/r_4.png").unlink(), "r_4: no such image"),
     "truncated image": (rewritten("train/r_4.png", lambda whole: whole[:100]), "r_4.png: .*(truncated|cannot be read)"),
     "larger image": (picture("train/r_4.png", SIZE, 52, 4), "r_4.png: is 52x48, r_0.png is 48x48, and one lens is"),
@@ -198,7 +195,7 @@ def first_camera(model: int, name: str, *parameters: float) -> Damage:
     return cameras(COLMAP_CAMERAS | {1: (model, name, [9, 9], parameters)})
 
 
-TWICE = rewritten("sparse/0/cameras.txt", lambda whole: whole.replace(b"\n7 ", b"\n1 "))
+TWICE = rewritten("sparse/0/cameras.txt", lambda whole: whole.replace(b"\n7 ", b"\n1 ")), "has two cameras of one num"
 COLMAP = {
     "another camera model": (first_camera(7, "FOV", 1, 1, 1, 1, 1), "camera model FOV is not read"),
     "no camera": (cameras({5: COLMAP_CAMERAS[1], 6: COLMAP_CAMERAS[7]}), "has camera 1, which the model lacks"),
@@ -424,11 +421,7 @@ FORMS = {  # what writes a good folder, what reads it or the path that the damag
     "nerfstudio": (lambda root: write_transforms(root, masks=True), LOADED, NERFSTUDIO),
     "view folders": (make_folders, LOADED, VIEW_FOLDERS),
     "COLMAP, binary": (lambda root: write_colmap(root, binary=True), LOADED, COLMAP | BINARY),
-    "COLMAP, text": (
-        lambda root: write_colmap(root, binary=False),
-        LOADED,
-        COLMAP | {"one camera twice": (TWICE, "two cam")},
-    ),
+    "COLMAP, text": (lambda root: write_colmap(root, binary=False), LOADED, COLMAP | {"one camera twice": TWICE}),
     "NeuS": (write_neus, LOADED, NEUS),
     "image": (write_images, of_file(read_image), IMAGES),
     "map": (Path.exists, of_file(read_environment), MAPS),

@@ -222,6 +222,9 @@ def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
     Image.new("L", (8, 6)).save(tmp_path / "a.bmp")
     with pytest.raises(InputError, match="a.png: may be a mask of the same photo as a.bmp; delete one of them"):
         mask_files(photos[:1], tmp_path)
+    Image.new("L", (8, 6), 255).save(tmp_path / "u\u0308.png")  # of a system that keeps letters with accents otherwise
+    (found,) = mask_files([Photograph(tmp_path / "\u00fc.jpg", "u", 8, 6, None, "")], tmp_path).values()
+    assert found.name == "u\u0308.png"
 
 
 TWO = np.random.default_rng(0).integers(0, 255, (2, 40, 60, 3), np.uint8)

@@ -337,6 +337,8 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         return
     try:
         spec = _first_picture(source, path) if source.format_name() == "openexr" else source.spec()
+        if spec.deep:
+            raise InputError(f"{name}: holds several samples a pixel (deep); flatten it")
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
         size = f"{spec.width}x{spec.height}"
         if min(spec.width, spec.height) < 1 or spec.depth > 1 or n_values > VALUES_PER_BYTE * path.stat().st_size:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_header, to_uint8
-from splitnerf.data.layouts.frame import OPENCV_AXES
+from splitnerf.data.layouts.frame import OPENCV_AXES, forms
 from splitnerf.data.normalisation import transform_points
 from splitnerf.data.photos import read_mask
 from splitnerf.data.pixels import decoded
@@ -73,7 +73,7 @@ def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
             if other != path and any(path.stem in (photo.path.name, photo.path.stem) for photo in photos):
                 raise InputError(f"{path}: may be a mask of the same photo as {other.name}; delete one of them")
     for photo in photos:
-        path = stems.get(photo.path.name, stems.get(photo.path.stem))
+        path = next((stems[x] for name in (photo.path.name, photo.path.stem) for x in forms(name) if x in stems), None)
         if path is None:
             raise InputError(f"{folder}: has no mask {photo.path.stem}.png; add it or leave --masks out")
         if path in found.values():

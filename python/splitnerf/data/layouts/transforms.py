@@ -64,7 +64,7 @@ def splits(root: Path) -> list[str] | None:
     if own := _own_splits(root):
         return own
     meta, _ = read_entries(root / SINGLE)
-    return [split for split in SPLITS if split == "train" or _held_out(meta)] if _has_lists(meta) else None
+    return [split for split in SPLITS if split == "train" or _held_out(meta, root)] if _has_lists(meta) else None
 
 
 def read(root: Path, split: str | None) -> list[Frame]:
@@ -115,14 +115,15 @@ def _has_lists(meta: dict) -> bool:
     return any(meta.get(key) for key in LISTS)
 
 
-def _listed(meta: dict, key: str) -> set[str]:
+def _listed(meta: dict, key: str, root: Path) -> set[str]:
     """The images that a list of a file names."""
-    return {_image(name) for name in meta.get(key) or ()}
+    return {_image(name, root) for name in meta.get(key) or ()}
 
 
-def _image(name: object) -> str:
-    """The image that a file lists, however its path is written and without its suffix."""
-    path, suffix = os.path.splitext(os.path.normpath(normalize("NFC", str(name).replace("\\", "/"))))
+def _image(name: object, root: Path) -> str:
+    """The image that a file lists, from the file's folder, however its path is written and without its suffix."""
+    path = os.path.relpath(root / normalize("NFC", str(name).replace("\\", "/")), root)
+    path, suffix = os.path.splitext(path)
     return path if suffix.lower() in LDR_SUFFIXES + HDR_SUFFIXES else path + suffix
 
 
@@ -131,21 +132,21 @@ def _of_other_files(root: Path, split: str) -> set[str]:
     files = [root / _own(name) for name in ("test", "val")] if split == "train" else []
     found = [read_json(path, "frames").get("frames") for path in files if path.is_file()]
     entries = [entry for frames in found if isinstance(frames, list) for entry in frames if isinstance(entry, dict)]
-    return {_image(entry.get("file_path")) for entry in entries}
+    return {_image(entry.get("file_path"), root) for entry in entries}
 
 
-def _held_out(meta: dict) -> set[str]:
+def _held_out(meta: dict, root: Path) -> set[str]:
     """The images that a single file lists for testing, or else for validation."""
-    return next((names for key in SPLITS["test"] if (names := _listed(meta, key))), set())
+    return next((names for key in SPLITS["test"] if (names := _listed(meta, key, root))), set())
 
 
-def _is_of(meta: dict, split: str) -> Callable[[str], bool]:
+def _is_of(meta: dict, split: str, root: Path) -> Callable[[str], bool]:
     """Whether an image is of a split of a single file. What any list holds out is none of training; without a list of its own
     the train split is all that no list holds out."""
     if split == "test":
-        return _held_out(meta).__contains__
-    chosen = _listed(meta, "train_filenames")
-    others = set().union(*(_listed(meta, key) for key in SPLITS["test"]))
+        return _held_out(meta, root).__contains__
+    chosen = _listed(meta, "train_filenames", root)
+    others = set().union(*(_listed(meta, key, root) for key in SPLITS["test"]))
     rest = chosen - others
     if chosen & others:
         what = "for testing" if rest else "for both: the scores of test views are those of photos trained on"
@@ -157,12 +158,12 @@ def _frames(path: Path, split: str | None, held_out: Set[str] = frozenset()) -> 
     """The frames of a file, or those of a split by its lists; without those that other files hold out, if that leaves any."""
     meta, entries = read_entries(path)
     _name_unused(meta, entries, path)
-    names = [_image(entry.get("file_path")) for entry in entries]
-    chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split)
-    listed = set().union(*(_listed(meta, key) for key in LISTS))
+    names = [_image(entry.get("file_path"), path.parent) for entry in entries]
+    chosen = (lambda name: True) if split is None or not _has_lists(meta) else _is_of(meta, split, path.parent)
+    listed = set().union(*(_listed(meta, key, path.parent) for key in LISTS))
     if unknown := sorted(listed - {*names}):
         note_once(f"{path}: lists of the splits name {len(unknown)} images that no frame has", unknown[0])
-    if split and _listed(meta, "train_filenames") and (others := sorted({*names} - listed)):
+    if split and meta.get("train_filenames") and (others := sorted({*names} - listed)):
         note_once(f"{path}: {len(others)} images are in no list of the splits, and not used", others[0])
     kept = [i for i, name in enumerate(names) if chosen(name)]
     if held_out & {names[i] for i in kept}:
