@@ -238,7 +238,12 @@ PLAIN_ONES = np.full((5, 150, 200, 3), 120, np.uint8) + np.arange(5, dtype=np.ui
 def test_photos_that_show_too_little_are_refused(tmp_path, capsys, photos, said):
     for i, pixels in enumerate(photos):
         write_image(tmp_path / f"photos/{i}.png", pixels / np.float32(255))
-    assert said in refused(capsys, "prepare", tmp_path / "photos", "--out", tmp_path / "data")
+    words = "prepare", tmp_path / "photos", "--out", tmp_path / "data"
+    (tmp_path / "masks").mkdir()
+    assert "masks: has no mask 0.png" in refused(
+        capsys, *words, "--masks", tmp_path / "masks"
+    )  # before cameras are found
+    assert not (tmp_path / "data/work").exists() and said in refused(capsys, *words)
 
 
 def one_camera_of_900_pixels() -> pycolmap.SyntheticDatasetOptions:

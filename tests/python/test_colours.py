@@ -114,15 +114,16 @@ def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
     return whole[:33] + chunk + whole[33:]
 
 
+@pytest.mark.parametrize("photo", [np.full((4, 4, 3), 90, np.uint8), np.full((4, 4), 90 * 257, np.uint16)])
 @pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
-def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, gamma, exponent):
-    (tmp_path / "x.png").write_bytes(
-        with_chunk(Image.fromarray(np.full((4, 4, 3), 90, np.uint8)), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
-    )
-    expected = 90 if exponent is None else 255 * linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
-    assert read_colours(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)
+def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, photo, gamma, exponent):
+    data = with_chunk(Image.fromarray(photo), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
+    (tmp_path / "x.png").write_bytes(data)
+    share = 90 / 255 if exponent is None else linear_to_srgb(np.float32([(90 / 255) ** exponent]))[0]
+    expected = pytest.approx(share * np.iinfo(photo.dtype).max, rel=0.01)
+    assert read_colours(tmp_path / "x.png")[0, 0, 0] == expected
     assert ("state the gamma" in capsys.readouterr().err) == (exponent is not None)
-    assert read_upright(tmp_path / "x.png")[0, 0, 0] == pytest.approx(expected, abs=1)  # as `prepare` reads it
+    assert read_upright(tmp_path / "x.png")[0, 0, 0] == expected  # as `prepare` reads it
 
 
 # From linear Adobe RGB to linear sRGB (Adobe RGB (1998) Color Image Encoding, section 4.3; IEC 61966-2-1).

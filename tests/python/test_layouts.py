@@ -212,10 +212,8 @@ def test_files_outside_of_the_folder_are_read_and_named_once(tmp_path, capsys):
         edit(root, lambda m, i=i, f=folder: m["frames"][i].update(file_path=f"{f}/images/v{i:02d}"), "transforms.json")
     assert len(load_dataset(root)) == COUNT - 2
     notes = [line for line in capsys.readouterr().err.splitlines() if "outside of" in line]
-    assert notes == [
-        f"splitnerf: note: {root}/transforms.json: names files outside of its folder; they are read "
-        "('../images/v00.png' is one)"
-    ]
+    said = "names files outside of its folder; they are read ('../images/v00.png' is one)"
+    assert notes == [f"splitnerf: note: {root}/transforms.json: {said}"]
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "/etc/passwd", "../secret"])
@@ -253,6 +251,8 @@ FRAMES = [  # the file, the frame, and fx, fy, cx, cy of a photo of the frame's 
     (WIDE, {"w": 60, "h": 120}, (60, 120), None),
     (WIDE, {"w": 60, "h": 120, "cx": 30, "cy": 60}, (60, 120), (100, 80, 30, 60)),
     ({"camera_angle_x": 1.0, "w": 120, "h": 60}, {"w": 60, "h": 120}, (60, 120), None),
+    ({"camera_angle_x": 1.0, "camera_angle_y": 0.5}, {}, (120, 60), (60 / np.tan(0.5), 30 / np.tan(0.25), 60, 30)),
+    (WIDE, {"cx": -10}, (120, 60), (100, 80, -10, 30)),
 ]
 
 
