@@ -172,7 +172,7 @@ def test_an_orientation_is_said(tmp_path, capsys):
         png(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / name, exif=exif)
         read(tmp_path / name)
         said = capsys.readouterr().err
-        assert f"state an EXIF orientation; their pixels are used as they are stored ({name}: 3)" in said
+        assert f"state an EXIF orientation; their pixels are used as they are stored ({tmp_path / name}: 3)" in said
 
 
 @pytest.mark.parametrize("exposures", [(), (2.0,), (4.0, 0.5)])

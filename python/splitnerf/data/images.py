@@ -70,10 +70,9 @@ def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
             note_once(f"{path.parent}: channels of images are not used: {', '.join(others)}", path.name)
         elif source.format_name() == "openexr" and not _named_channels(spec):
             what = "images without channels R, G, B or Y: theirs count as grey or colours, and alpha"
-            note_once(f"{path.parent}: {what}", f"{path.name}: {', '.join(spec.channelnames)}")
+            note_once(what, f"{name}: {', '.join(spec.channelnames)}")
         if (turn := spec.getattribute("Orientation") or 1) != 1 and source.format_name() != "hdr":
-            what = "images state an EXIF orientation; their pixels are used as they are stored"
-            note_once(f"{path.parent}: {what}", f"{path.name}: {turn}")
+            note_once("images state an EXIF orientation; their pixels are used as they are stored", f"{name}: {turn}")
         top, left, height, width = _window(source, spec)
         exposure, order = _radiance_head(path, name) if source.format_name() == "hdr" else (1.0, (1, 1))
         primaries = spec.getattribute("chromaticities") if source.format_name() == "openexr" else None

@@ -24,7 +24,7 @@ HEIC = (".heic", ".heif")
 HEIC_BRANDS = (b"ftypheic", b"ftypheix", b"ftypmif1")
 OTHER = (".avif", ".gif", ".jp2", ".jxl", ".exr", ".hdr")
 # In an MP4, and in a Matroska or WebM file: its curve is PQ or HLG, by the numbers of ITU-T H.273.
-HIGH_RANGE = rb"(?s)colrncl[cx]..\0[\x10\x12]|\x55\xb0.{1,99}?\x55\xba\x81[\x10\x12]"
+HIGH_RANGE = rb"(?s)colrncl[cx]..\0[\x10\x12]", rb"(?s)\x55\xb0.{1,99}?\x55\xba\x81[\x10\x12]"
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".raf", ".rw2")
 SHARPNESS_WIDTH = 640  # pixels to which a photo is reduced before its sharpness is measured
 WHOLE = 0.95  # share of the frames that a video states which a whole one has
@@ -150,7 +150,7 @@ def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], No
     if not reader.isOpened() or total < 1:
         raise InputError(f"{video}: is no video that can be read; convert it to mp4, or give a folder of photos")
     with open(video, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        if re.search(HIGH_RANGE, content):
+        if any(re.search(curve, content) for curve in HIGH_RANGE):
             note(f"{video}: is a video of high dynamic range (HLG or PQ), read as if it was sRGB; convert it")
     best, most, window = None, -1.0, 0
     for number in range(total + 1):
