@@ -271,6 +271,8 @@ WORDLESS = (
 BITMAP = struct.pack("<2sIHHIIiiHHIIiiII", b"BM", 58, 0, 0, 54, 40, 1, 1, 1, 24, 0, 4, 1, 1, 0, 0) + bytes(4)
 IMAGES = {
     **{f"half {s}": (rewritten(f"cut{s}", half), f"cut{s}: .*(truncated|cannot be read)") for s in SUFFIXES},
+    "flipped bit": (rewritten("cut.png", lambda data: data[:99] + bytes([data[99] ^ 1]) + data[100:]), "cut.png: tr"),
+    "no pixels": (rewritten("cut.png", lambda data: data[:33]), "cut.png: truncated or damaged image"),
     "none": (lambda root: root / "gone.png", "gone.png: no such image"),
     "text": (file("a.png", b"no image"), "a.png: cannot be read"),
     "large PNG": (file("a.png", png(4000, 4000)), f"a.png: {CLAIMED}"),
@@ -446,7 +448,7 @@ def good(tmp_path_factory) -> Callable[[str, Path], object]:
 
 
 @pytest.mark.parametrize(("form", "case"), [(form, case) for form, (*_, table) in FORMS.items() for case in table])
-def test_bad_files_give_one_line_that_names_them(good, tmp_path, form, case):
+def test_bad_files_give_one_line_that_names_them(good, tmp_path, capfd, form, case):
     _, read, table = FORMS[form]
     damage, message = table[case]
     good(form, tmp_path / "data")
@@ -455,3 +457,4 @@ def test_bad_files_give_one_line_that_names_them(good, tmp_path, form, case):
         read(tmp_path / "data", path)
     line = str(caught.value)
     assert line.startswith((str(tmp_path), "/: ")) and len(line) < 6000
+    assert "libpng" not in capfd.readouterr().err  # a line beside the program's own

@@ -233,7 +233,11 @@ PLAIN_ONES = np.full((5, 150, 200, 3), 120, np.uint8) + np.arange(5, dtype=np.ui
 
 @pytest.mark.parametrize(
     "photos, said",
-    [(TWO, "holds 2 different photos, fewer than 3; take 30"), (PLAIN_ONES, "show too little detail; put")],
+    [
+        (TWO, "holds 2 different photos, fewer than 3; take 30"),
+        (PLAIN_ONES, "show too little detail; put"),
+        (PLAIN_ONES - 120, "all photos are too dark; expose them longer"),
+    ],
 )
 def test_photos_that_show_too_little_are_refused(tmp_path, capsys, photos, said):
     for i, pixels in enumerate(photos):
@@ -341,7 +345,7 @@ def test_a_folder_is_prepared_by_one_program(tmp_path, capsys):
     assert len(list(deep.parent.iterdir())) == 3 and not deep.exists()
 
 
-def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
+def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch, capsys):
     seeds, parts = [], {"_photographs": [], "_sorted_out": ([], {}), "_upright_copies": [], "_without_camera": {}}
     for name, result in parts.items():
         monkeypatch.setattr(preparation, name, lambda *_, result=result: result)
@@ -349,6 +353,7 @@ def test_the_seed_reaches_all_that_draws(tmp_path, monkeypatch):
     monkeypatch.setattr(preparation, "settle", lambda found, seed: seeds.append(seed) or 1 / 0)
     main(["prepare", str(tmp_path), "--out", str(tmp_path / "out"), "--seed", "7"])
     assert seeds == [7, 7]
+    assert "--seed must be at least 0" in refused(capsys, "prepare", tmp_path, "--out", tmp_path, "--seed", 1 << 31)
 
 
 def as_whole(image: np.ndarray, i: int) -> np.ndarray:
@@ -404,10 +409,8 @@ def test_photos_to_data(tmp_path, capsys, monkeypatch, given, turntable, held):
     frames = json.loads((tmp_path / "data" / "transforms.json").read_text())["frames"]
     found = np.array([frame["transform_matrix"] for frame in frames])
     # Centres relative to the ball's, in the cameras' distances, are what no similarity changes but a turn about z.
-    angle = np.unwrap(np.arctan2(found[:, 1, 3], found[:, 0, 3])) - np.unwrap(
-        np.arctan2(truth[:, 1, 3], truth[:, 0, 3])
-    )
-    assert np.ptp(angle) < 0.01
+    angles = [np.unwrap(np.arctan2(p[:, 1, 3], p[:, 0, 3])) for p in (found, truth)]
+    assert np.ptp(np.subtract(*angles)) < 0.01
     assert np.allclose(found[:, 2, 3], truth[:, 2, 3] * CAMERA_DISTANCE / 3.0, atol=0.03)
     assert all(("light_rotation" in frame) == turntable for frame in frames)
     overlap = []

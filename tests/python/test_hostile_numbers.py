@@ -41,6 +41,8 @@ def test_vertices_out_of_reach_are_refused(value):
 def test_meshes_that_are_none_are_refused(n_vertices, columns, faces):
     with pytest.raises(ValueError):
         MeshScene(np.eye(3, dtype=np.float32)[:n_vertices, :columns], np.reshape(faces, (-1, 3)).astype(np.int64))
+    with pytest.raises(TypeError, match="faces must be integers, got float64"):
+        MeshScene(np.eye(3), np.array([[0, 1, 1.7]]))
 
 
 @pytest.mark.parametrize("value", BAD)

@@ -2,15 +2,17 @@
 
 import os
 import shutil
+from unittest.mock import Mock
 
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.errors import InputError
 from splitnerf.files import LOCK, atomic_path, is_own, locked, own_folder
+from splitnerf_tools.capture import prepare as preparation
 from splitnerf_tools.capture.photographs import find_photographs
-from splitnerf_tools.capture.prepare import fingerprint
 from splitnerf_tools.separation.separate import separate
 from tiny_runs import command, contents, refused, train
 
@@ -110,12 +112,8 @@ def test_what_a_refinement_fitted_or_begins_with_is_not_replaced(done, mine, cap
         shutil.copy(done / name, mine)
     before = contents(mine) | contents(done)
     assert "refined: holds what a refinement fitted" in refused(capsys, "export", done, "--out", done / "refined")
-    assert "mine: holds the asset to refine" in refused(
-        capsys, "refine", mine, "--data", "data", "--out", mine, "--overwrite"
-    )
-    assert "mine/mesh.glb: would be replaced" in refused(
-        capsys, "refine", done, "--data", "data", "--out", mine, "--resume"
-    )
+    assert "mine: holds the asset" in refused(capsys, "refine", mine, "--data", "data", "--out", mine, "--overwrite")
+    assert "mesh.glb: would be replaced" in refused(capsys, "refine", done, "--data", "data", "--out", mine, "--resume")
     assert contents(mine) | contents(done) == before
 
 
@@ -194,14 +192,17 @@ def test_tables_and_logs_replace_nothing_else(data, mine, capsys, name):
     assert contents(mine) == before
 
 
-def test_frames_of_a_video_are_kept_for_it_alone(tmp_path):
-    """Another video, another number of frames or a changed file is another purpose."""
-    (tmp_path / "a.mp4").write_text("a")
-    (tmp_path / "b.mp4").write_text("b")
-    prints = [fingerprint([tmp_path / name], n) for name, n in (("a.mp4", 30), ("b.mp4", 30), ("a.mp4", 10))]
-    assert len(set(prints)) == 3 and fingerprint([tmp_path / "a.mp4"], 30) == prints[0]
-    (tmp_path / "a.mp4").write_text("longer")
-    assert fingerprint([tmp_path / "a.mp4"], 30) not in prints
+def test_frames_of_a_video_are_kept_for_it_alone(tmp_path, monkeypatch):
+    """And not written again; another video, another number of frames or a changed file is another purpose."""
+    write = Mock(side_effect=lambda video, folder, n, _: Image.new("L", (n, 3)).save(folder / f"{video.stem}{n}.png"))
+    monkeypatch.setattr(preparation, "write_frames", write)
+    found = []
+    for name, n, content in (("a.mp4", 4, ""), ("a.mp4", 4, ""), ("b.mp4", 4, ""), ("b.mp4", 2, ""), ("b.mp4", 2, "x")):
+        with open(tmp_path / name, "a") as video:  # what is added changes it
+            video.write(content)
+        settings = preparation.PrepareSettings(frames=n)
+        found += [photo.name for photo in preparation._photographs(tmp_path / name, tmp_path / "out", settings, print)]
+    assert found == ["a4", "a4", "b4", "b2", "b2"] and write.call_count == 4
 
 
 def test_photos_have_names_of_their_own(tmp_path):

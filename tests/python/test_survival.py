@@ -99,9 +99,8 @@ def test_a_signal_elsewhere_leaves_nothing_half_written(data, tmp_path, monkeypa
 
 def test_a_module_that_is_being_loaded_does_not_swallow_a_signal(tmp_path, monkeypatch):
     """As some do that take any exception for a missing library."""
-    (tmp_path / "swallower.py").write_text(
-        "import signal\ntry: signal.raise_signal(2)\nexcept BaseException: loaded = 0"
-    )
+    content = "import signal\ntry: signal.raise_signal(2)\nexcept BaseException: loaded = 0"
+    (tmp_path / "swallower.py").write_text(content)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(KeyboardInterrupt), ended_by_signals():
         import swallower

@@ -168,9 +168,8 @@ class Stages:
             cpu = f"{n} thread{'s' * (n > 1)} of the CPU"
             total, free = (f"{size / 1e9:.3g}" for size in memory_bytes())
             where = f"{cpu if training.model.device.type == 'cpu' else 'the GPU'}, {free} of {total} GB of memory free"
-            ends = (
-                f"{run.max_minutes:.3g} minutes, export and scores aside" if run.max_minutes else f"{run.steps} steps"
-            )
+            limit = f"{run.max_minutes:.3g} minute{'s' * (run.max_minutes != 1)}, export and scores aside"
+            ends = limit if run.max_minutes else f"{run.steps} steps"
             if not training.finished:
                 self._say("training", f" on {where}; in all {ends}; results go to {plain(str(training.run))}")
         elif event.kind in self._names:
@@ -212,9 +211,7 @@ def print_refinement(summary: dict | None) -> None:
         print(f"the light was made {summary['level']:.2f} times as bright, as highlights ask")
     if max(summary["tint"]) > 1:
         factors = ", ".join(f"{factor:.2f}" for factor in summary["tint"])
-        print(
-            f"metal of one faint colour is taken for grey: the light's red, green and blue are multiplied by {factors}"
-        )
+        print(f"metal of one faint colour is taken for grey: the light's red, green, blue are multiplied by {factors}")
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
     if summary["detail"]:

@@ -45,12 +45,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--size", metavar="W[xH]", help="pixels (default: the data's or the path's, else 512)")
     add("--spp", type=int, default=128, metavar="N", help="paths a pixel (default: 128)")
     add("--bounces", type=int, default=4, metavar="N", help="scattering events after the first (default: 4)")
-    add(
-        "--background",
-        default="transparent",
-        metavar="WHAT",
-        help="transparent (default), white, environment, or an image",
-    )
+    add("--background", default="transparent", metavar="WHAT", help="transparent (default), white, environment, image")
     add("--shadow-catcher", action="store_true", help="show the shadow on the ground below the object")
     add("--exposure", type=float, default=0.0, metavar="EV", help="stops brighter (default: 0)")
     add("--gif", action="store_true", help="write animation.gif too")

@@ -41,12 +41,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         ),
     )
     add = parser.add_argument
-    add(
-        "data",
-        type=Path,
-        metavar="DATA",
-        help="folder of photographs with cameras; without masks the object is searched for",
-    )
+    add("data", type=Path, metavar="DATA", help="folder of photographs with cameras; without masks the object is found")
     add("--out", type=Path, metavar="RUN", help="the run's folder (default: runs/<data name>)")
     add_training_options(parser)
     add("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
@@ -79,10 +74,8 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         choices=["cpu", "fast", "paper"],
         help="cpu: small, for a few cores (default there); fast: for a GPU (default there); paper: the publication's settings",
     )
-    add("--steps", type=int, metavar="N", help="optimiser steps; the schedule fits itself to them")
-    add(
-        "--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule fits itself to it"
-    )
+    add("--steps", type=int, metavar="N", help="optimiser steps; the schedule adapts to them")
+    add("--max-minutes", type=float, metavar="M", help="time of training and refinement; the schedule adapts to it")
     add(
         "--device",
         choices=["auto", "cpu", "cuda"],
@@ -95,11 +88,7 @@ def add_training_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="two runs with one seed give the same bits, on one machine with one number of threads",
     )
-    add(
-        "--no-refine",
-        action="store_true",
-        help="no refinement: deliver what training exports, and give training all minutes",
-    )
+    add("--no-refine", action="store_true", help="deliver what training exports, and give training all minutes")
     add(
         "--set",
         action="append",

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import io
+import mmap
 import os
 import re
 import shutil
 import struct
 import tempfile
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
@@ -56,7 +58,7 @@ def read_codes(path: str | os.PathLike, name: str = "") -> np.ndarray:
     name it `name`, by default the path. Notes say what a file states that is not used."""
     path = Path(path)
     name = name or str(path)
-    with _opened(path, name) as (source, spec):
+    with _opened(path, name, whole=True) as (source, spec):
         kind = str(spec.format) if str(spec.format) in STORED else "float"
         pixels = source.read_image(source.current_subimage(), 0, 0, spec.nchannels, kind)
         if pixels is None or source.has_error:
@@ -300,8 +302,9 @@ def _radiance_head(path: Path, name: str) -> tuple[float, tuple[int, int]]:
 
 
 @contextmanager
-def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
-    """An image file with its header read, whose size is no more than its bytes and the memory allow."""
+def _opened(path: Path, name: str, *, whole: bool = False) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
+    """An image file with its header read, whose size is no more than its bytes and the memory allow; whether its pixels, too,
+    will be read `whole`."""
     if not os.path.isfile(path):
         raise InputError(f"{name}: no such image; check the path")
     try:
@@ -310,12 +313,14 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "image"
             shutil.copyfile(path, copy)
-            with _opened(copy, name) as opened:
+            with _opened(copy, name, whole=whole) as opened:
                 yield opened
         return
     with open(path, "rb") as file:
-        if not file.read(16).startswith(SIGNATURES):
+        if not (head := file.read(16)).startswith(SIGNATURES):
             raise InputError(f"{name}: cannot be read as an image (no PNG, JPEG, WebP, EXR or HDR file); replace it")
+        if head.startswith(SIGNATURES[0]):
+            _check_png(file, name, b"IEND" if whole else b"IDAT")
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
@@ -331,7 +336,7 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "image"
             copy.write_bytes(plain)
-            with _opened(copy, name) as opened:
+            with _opened(copy, name, whole=whole) as opened:
                 yield opened
         return
     try:
@@ -349,6 +354,18 @@ def _opened(path: Path, name: str) -> Iterator[tuple[oiio.ImageInput, oiio.Image
         yield source, spec
     finally:
         source.close()
+
+
+def _check_png(file: BinaryIO, name: str, until: bytes) -> None:
+    """Raises InputError where a PNG is cut or damaged before its first chunk `until`: its library would print a line of its own."""
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        start = 8
+        while (kind := data[start + 4 : start + 8]) != until:
+            end = start + 8 + int.from_bytes(data[start : start + 4], "big")
+            stated, needed = int.from_bytes(data[end : end + 4], "big"), kind[:1].isupper()
+            if not kind or needed and zlib.crc32(data[start + 4 : end]) != stated:
+                raise InputError(f"{name}: truncated or damaged image (by its checksums); replace it")
+            start = end + 4
 
 
 def _first_picture(source: oiio.ImageInput, path: Path) -> oiio.ImageSpec:
