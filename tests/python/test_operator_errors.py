@@ -166,6 +166,10 @@ POINT = {"normals": X, "view_dirs": X, "albedo": X, "roughness": ONE, "metallic"
             "light_queries: view_dirs must be dense, got torch.sparse_coo",
         ),
         (lambda: ops.linear_to_srgb(np.ones(3)), "linear_to_srgb: linear must be a tensor, got ndarray"),
+        (
+            lambda: ops.occlusion_factors(X, X, X, lobe_dirs=X, roughness=ONE, environment=X),
+            "occlusion_factors: scene must be a MeshScene, got Tensor",
+        ),
         (lambda: ops.light.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
         (
             lambda: ops.split_sum_shade(**POINT | {"compensate": "no"}),

@@ -385,7 +385,7 @@ def test_numbers_too_large_for_a_float_are_no_news_in_a_log(tmp_path):
     (tmp_path / METRICS).write_text(f'{{"step": 1, "loss": {huge}, "psnr": 20.0}}\n{{"step": {huge}, "loss": 1.0}}\n')
     lines = read_metrics(tmp_path / METRICS)
     assert [line["step"] for line in lines] == [1]
-    assert [title for title, *_ in _charts(lines)] == ["PSNR of the batch (dB)"]
+    assert [title for title, *_ in _charts(lines)] == ["Photos while training, PSNR (dB)"]
 
 
 FITTED = ("mesh.glb", "mesh.ply", "environment.exr", "environment.hdr", "trained/mesh.glb")

@@ -210,6 +210,8 @@ def _wrong_type(signature: inspect.Signature, args: tuple, kwargs: dict, error: 
         kind = str(signature.parameters[argument].annotation)
         if kind.startswith("Tensor") and not isinstance(x, Tensor) and (x is not None or "None" not in kind):
             return f"{argument} must be a tensor, got {type(x).__name__}"
+        if kind == "MeshScene" and not hasattr(x, "handle"):
+            return f"{argument} must be a MeshScene, got {type(x).__name__}"
         if isinstance(x, Tensor) and (x.layout is not torch.strided or x.is_quantized):
             return f"{argument} must be dense, got {'quantised numbers' if x.is_quantized else x.layout}"
     found = re.search("a value of type '(.*)' for argument '(.*)' but instead found type '(.*)'", error)

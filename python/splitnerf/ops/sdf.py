@@ -30,7 +30,8 @@ class HashGridSpec:
     Attributes:
         n_levels: The number of levels, 1 to 32.
         n_features: The number of features per level: 1, 2, 4 or 8.
-        base_resolution: The number of cells along an edge of the coarsest level.
+        base_resolution: The number of cells along an edge of the coarsest level. Take one whose (n + 1)^3 nodes fit into
+            the table: where no level does, all places share entries with places far away, and little is learned.
         growth: The factor between the resolutions of neighbouring levels, at least 1.
         log2_table_size: The base-2 logarithm of the largest number of entries per level; finer levels share their
             entries by hashing.
@@ -162,7 +163,7 @@ class HashGrid(nn.Module):
         ValueError: table_dtype is another dtype.
 
     Example:
-        >>> grid = HashGrid(HashGridSpec(n_levels=4, log2_table_size=12))
+        >>> grid = HashGrid(HashGridSpec(n_levels=4, base_resolution=8, log2_table_size=12))
         >>> grid(torch.rand(5, 3)).shape
         torch.Size([5, 8])
     """

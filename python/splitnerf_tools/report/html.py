@@ -142,7 +142,7 @@ def _charts(history: Sequence[Mapping]) -> list[tuple[str, dict, bool]]:
 
     parts = sorted({key for line in history for key in line if key.startswith("loss_")})
     charts = [
-        ("PSNR of the batch (dB)", {"psnr": series("psnr")}, False),
+        ("Photos while training, PSNR (dB)", {"psnr": series("psnr")}, False),
         ("Loss", {"loss": series("loss")}, True),
         ("Terms of the loss", {key.removeprefix("loss_"): series(key) for key in parts}, True),
     ]
