@@ -84,9 +84,7 @@ def seen(report):
         return say(channel, f"document.querySelectorAll('#object [name=channel]')[{number}].click()")
 
     def light(name):
-        script = (
-            f"(l => {{ l.selectedIndex = [...l.options].findIndex((o) => o.text === '{name}'); {INPUT} }})({LIGHT})"
-        )
+        script = f"(l => {{ l.selectedIndex = [...l.options].findIndex(o => o.text === '{name}'); {INPUT} }})({LIGHT})"
         return say(name, script)
 
     def text(name, selector):

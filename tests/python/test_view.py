@@ -49,6 +49,8 @@ def test_what_is_served_is_what_is_on_the_disk(shown_run, served):
     assert ask(served, "")[2] == (PAGE / "viewer.html").read_bytes().replace(b"{{SCRIPT}}", script)
     assert ask(served, "assets/0")[2] == (shown_run / "mesh.glb").read_bytes()
     scene = json.loads(ask(served, "scene.json")[2])
+    facts = scene["sources"][0].pop("facts")
+    assert facts.startswith("1 faces, ") and " units wide" in facts
     assert scene["sources"] == [{"name": "mine", "light": 0, "version": 1}] and scene["problems"] == []
     assert [light["name"] for light in scene["lights"]] == ["recovered light of mine", "white", *STUDIO_LIGHTS]
     light = halves(ask(served, "lights/0"))
@@ -63,7 +65,7 @@ def test_two_assets_and_a_given_light(shown_run, tmp_path):
         scene = json.loads(ask(server, "scene.json")[2])
         assert [source["name"] for source in scene["sources"]] == ["mine", "other.glb"]
         assert scene["first_light"] == 0 and scene["lights"][0]["name"] == "studio.hdr"
-        assert scene["sources"][1] == {"name": "other.glb", "light": None, "version": 1}
+        assert scene["sources"][1].items() >= {"name": "other.glb", "light": None, "version": 1}.items()
         assert ask(server, "assets/1")[2] == other.read_bytes()
         assert ask(server, "assets/2")[0] == 404
 
@@ -82,7 +84,7 @@ def test_what_is_damaged_beside_the_asset_becomes_a_line(shown_run, capsys):
     with serving(shown_run) as server:
         scene = json.loads(ask(server, "scene.json")[2])
     assert [line.split(": ")[0] for line in scene["problems"]] == [str(shown_run / "environment.exr")]
-    assert scene["sources"] == [{"name": "mine", "light": None, "version": 1}]
+    assert scene["sources"][0]["light"] is None
     assert capsys.readouterr().err.count("note: ") == 1
 
 
@@ -404,11 +406,9 @@ def wait_until(wanted) -> None:
 @contextmanager
 def asking_for_pictures(server, **camera):
     """A page that has asked for pictures and has read the answer's first bytes."""
-    body, path = json.dumps(camera).encode(), urlsplit(server.url).path
+    body, url = json.dumps(camera).encode(), urlsplit(server.url)
     with socket.create_connection(server.server_address, timeout=20) as page:
-        head = (
-            f"POST {path}final HTTP/1.1\r\nHost: {urlsplit(server.url).netloc}\r\nContent-Length: {len(body)}\r\n\r\n"
-        )
+        head = f"POST {url.path}final HTTP/1.1\r\nHost: {url.netloc}\r\nContent-Length: {len(body)}\r\n\r\n"
         page.sendall(head.encode() + body)
         assert page.recv(12).startswith(b"HTTP/1.0 200")
         yield page

@@ -4,6 +4,7 @@ Skipped where Node, Chromium or the packages of the page's sources (`npm ci` the
 """
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -68,6 +69,8 @@ def seen(run):
         *keys("s"),
         text("saved", "window.saved"),
         text("bar", "(b => [b.textContent, b.offsetWidth])(document.querySelector('.bar3d'))"),
+        text("axes", "document.querySelector('.axes3d').innerHTML"),
+        text("file", "(a => [a.download, a.parentElement.textContent])(document.querySelector('#panel a'))"),
         text("titles", "[...document.querySelectorAll('#panel [title]')].map((e) => e.title)"),
         {"do": "set", "selector": "[name=exposure]", "value": 3},
         text(
@@ -313,6 +316,10 @@ def test_what_the_controls_say(seen):
     # The picture is 440 pixels high; the ball's middle is 1.1 / sin of the half field away.
     focal = 220 / np.tan(HALF_FIELD)
     assert pixels_wide == pytest.approx(float(length) * focal * np.sin(HALF_FIELD) / 1.1, abs=2) and pixels_wide <= 90
+    ends = sorted(re.findall(r'class="(.)" d="M0 0L(\S+) (\S+)"', texts["axes"]))  # at the front, from 20 degrees above
+    seen_so = 20 * np.array([[1, 0], [0, -np.sin(np.radians(20))], [0, -np.cos(np.radians(20))]])
+    np.testing.assert_allclose(np.float64([end[1:] for end in ends]), seen_so, atol=1e-3)
+    assert texts["file"][0] == "mine.glb" and " faces, textures of " in texts["file"][1]
     assert texts["reset"] == "0" and texts["greyed"] == [True, True] and texts["untouched"] == ["0", False]
     for words in ("(b)", "([ ]); a double click resets it", "(f)", "(w)"):
         assert any(words in title for title in texts["titles"]), words

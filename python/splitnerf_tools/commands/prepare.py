@@ -41,13 +41,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
     parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")
     parser.add_argument("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
-    parser.add_argument(
-        "--max-size",
-        type=int,
-        default=0,
-        metavar="N",
-        help="longest edge of the written images in pixels (default: the photos')",
-    )
+    parser.add_argument("--max-size", type=int, default=0, metavar="N", help="longest edge in pixels (0: the photos')")
     parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
     parser.add_argument(
         "--turntable",

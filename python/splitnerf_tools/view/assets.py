@@ -24,6 +24,7 @@ from splitnerf.files import reason
 from splitnerf.relight.studio import STUDIO_LIGHTS, is_studio_light, light_named, studio_light
 
 from splitnerf_tools.report.embedding import camera_of
+from splitnerf_tools.report.sections import facts_of
 
 MOST_ROWS = 1024  # of a light
 LARGEST = 1600  # pixels of a photo's longer side in the page
@@ -136,7 +137,11 @@ class ViewedAssets:
         with self._lock:
             lights = [{"number": number, "name": light.name} for number, light in self._lights.items()]
         return {
-            "sources": [{"name": source.name, "light": source.light, "version": source.version} for source in sources],
+            "sources": [
+                {"name": source.name, "light": source.light, "version": source.version}
+                | {"facts": facts_of(source.asset) if source.version else ""}
+                for source in sources
+            ],
             "lights": lights,
             "first_light": self._first,
             "white": self._white,

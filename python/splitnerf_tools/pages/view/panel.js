@@ -17,7 +17,11 @@ export class Panel extends Controls {
   constructor(viewer, description, changed, opened) {
     const names = description.cameras.map((camera, i) => [i, camera.name]);
     const photos = element("fieldset", {}, check("cameras", "Cameras (click one)"), select("through", "Look through", [[-1, "none"], ...names]));
-    const last = names.length ? [photos] : [];
+    const files = description.sources.filter(({ facts }) => facts).map(({ name, facts }, i) => {
+      const file = `${name.replace(/\.glb$/i, "")}.glb`;
+      return element("p", { class: "hint" }, element("a", { href: `assets/${i}`, download: file }, file), ` ${facts}`);
+    });
+    const last = names.length ? [photos, ...files] : files;
     super(field("panel"), viewer, {
       changed, last, keys: KEYS, name: description.sources[0].name,
       first: [element("div", { class: "pair" }, check("final", "Final: path traced"), select("paths", "up to", PATHS), check("denoise", "Denoise", true))],

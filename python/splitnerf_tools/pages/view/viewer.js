@@ -29,7 +29,8 @@ export class Viewer extends EventTarget {
     this.factor = 1; // its exposure
     this.spunAt = 0;
     this.bar = element("div", { class: "bar3d", title: "a length at the object's middle, in the units of the data" });
-    canvas.after(this.bar);
+    this.axes = element("div", { class: "bar3d axes3d", title: "the axes of the data" });
+    canvas.after(this.bar, this.axes);
     this.home();
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
@@ -142,6 +143,12 @@ export class Viewer extends EventTarget {
     this.bar.hidden = channel === undefined || unfolded;
     this.bar.textContent = String(Number(length.toPrecision(1)));
     this.bar.style.width = `${length * pixels}px`;
+    this.axes.hidden = this.bar.hidden;
+    const seen = this.camera.quaternion.clone().invert();
+    const ends = ["x", "y", "z"].map((name, i) => ({ name, ...new THREE.Vector3().setComponent(i, 1).applyQuaternion(seen) }));
+    ends.sort((a, b) => a.z - b.z); // the nearest one lies above the others
+    const drawn = ends.map(({ name, x, y }) => `<path class="${name}" d="M0 0L${20 * x} ${-20 * y}"/><text x="${27 * x}" y="${4 - 27 * y}">${name}</text>`);
+    this.axes.innerHTML = `<svg viewBox="-34 -34 68 68" width="68">${drawn.join("")}</svg>`;
   }
 
   /** Saves the picture as it is shown. */
