@@ -6,7 +6,7 @@ Prints the depth's error against the exact intersection and writes the normals a
 import sys
 
 import torch
-from splitnerf.data.images import write_image
+from PIL import Image
 from splitnerf.ops import composite, march_rays, surface_weights
 from splitnerf.ops.rays import CELL_OCCUPIED
 
@@ -40,9 +40,8 @@ def main(path: str = "rays.png") -> None:
     inside = x * x + z * z < 0.9
     exact = 4 - torch.sqrt(1 - x * x - z * z)[inside]
     error = (depth[inside, 0] - exact).abs().mean().item()
-    write_image(
-        path, ((normals * 0.5 + 0.5) * opacity[:, None] + 1 - opacity[:, None]).clamp(0, 1).view(SIZE, SIZE, 3).numpy()
-    )
+    on_white = (normals * 0.5 + 0.5) * opacity[:, None] + 1 - opacity[:, None]
+    Image.fromarray((255 * on_white.clamp(0, 1) + 0.5).byte().view(SIZE, SIZE, 3).numpy()).save(path)
     print(
         f"{len(weights)} samples on {len(x)} rays; depth error {error:.5f} (step {STEP}), opacity {opacity[inside].min():.4f}; wrote {path}"
     )

@@ -6,8 +6,8 @@ Three spheres a row, with roughness 0.1, 0.4 and 0.8; gold above, red plastic be
 import sys
 
 import torch
-from splitnerf.data.images import linear_to_srgb, write_image
-from splitnerf.ops import fibonacci_directions, light_queries, prefilter_light, split_sum_shade
+from PIL import Image
+from splitnerf.ops import fibonacci_directions, light_queries, linear_to_srgb, prefilter_light, split_sum_shade
 
 SIZE = 128
 
@@ -52,7 +52,7 @@ def shade(albedo: list[float], roughness: float, metallic: float) -> torch.Tenso
 def main(path: str = "shading.png") -> None:
     rows = [([1.0, 0.77, 0.34], 1.0), ([0.6, 0.05, 0.04], 0.0)]
     image = torch.cat([torch.cat([shade(a, rho, m) for rho in (0.1, 0.4, 0.8)], dim=1) for a, m in rows])
-    write_image(path, linear_to_srgb(image.clamp(0, 1).numpy()))
+    Image.fromarray((255 * linear_to_srgb(image.clamp(0, 1)) + 0.5).byte().numpy()).save(path)
     print(f"wrote {path}, mean radiance {image.mean():.4f}")
 
 

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     first, last = refined.sweeps[0], refined.sweeps[-1]
     if refined.outline:
         print(f"coverage at the outline, squared error: {refined.outline[0]:.2g} -> {refined.outline[-1]:.2g}")
-    print(f"colours, squared error: {first.error:.3g} -> {last.error:.3g} in {last.number} steps, {last.seconds:.0f} s")
+    print(f"colours, squared error: {first.error:.3g} -> {last.error:.3g} at step {last.number}, {last.seconds:.0f} s")
     print(f"results: {out / 'mesh.glb'}, {out / 'environment.exr'}")
     print(f"look at it: splitnerf view {quote(str(out / 'mesh.glb'))}")
     return DONE
