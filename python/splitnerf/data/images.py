@@ -303,8 +303,8 @@ def _radiance_head(path: Path, name: str) -> tuple[float, tuple[int, int]]:
 
 @contextmanager
 def _opened(path: Path, name: str, *, whole: bool = False) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec]]:
-    """An image file with its header read, whose size is no more than its bytes and the memory allow; whether its pixels, too,
-    will be read `whole`."""
+    """An image file with its header read, whose size is no more than its bytes and the memory allow; `whole`: its pixels will be
+    read, too."""
     if not os.path.isfile(path):
         raise InputError(f"{name}: no such image; check the path")
     try:

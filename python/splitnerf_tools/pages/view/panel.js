@@ -17,9 +17,9 @@ export class Panel extends Controls {
   constructor(viewer, description, changed, opened) {
     const names = description.cameras.map((camera, i) => [i, camera.name]);
     const photos = element("fieldset", {}, check("cameras", "Cameras (click one)"), select("through", "Look through", [[-1, "none"], ...names]));
-    const files = description.sources.filter(({ facts }) => facts).map(({ name, facts }, i) => {
+    const files = description.sources.flatMap(({ name, facts }, i) => {
       const file = `${name.replace(/\.glb$/i, "")}.glb`;
-      return element("p", { class: "hint" }, element("a", { href: `assets/${i}`, download: file }, file), ` ${facts}`);
+      return facts ? [element("p", { class: "hint" }, element("a", { href: `assets/${i}`, download: file }, file), ` ${facts}`)] : [];
     });
     const last = names.length ? [photos, ...files] : files;
     super(field("panel"), viewer, {

@@ -29,7 +29,7 @@ export class Viewer extends EventTarget {
     this.factor = 1; // its exposure
     this.spunAt = 0;
     this.bar = element("div", { class: "bar3d", title: "a length at the object's middle, in the units of the data" });
-    this.axes = element("div", { class: "bar3d axes3d", title: "the axes of the data" });
+    this.axes = element("div", { class: "bar3d axes3d", "aria-hidden": "true" });
     canvas.after(this.bar, this.axes);
     this.home();
     new ResizeObserver(() => this.draw()).observe(canvas);
