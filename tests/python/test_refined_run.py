@@ -424,7 +424,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
         ({}, f"{after:.2f} dB"),
         ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),
         ({"level": 1.1}, "the light was made 1.10 times as bright"),
-        ({"tint": [1.25, 1.0, 0.8]}, "red, green and blue are multiplied by 1.25, 1.00, 0.80"),
+        ({"tint": [1.25, 1.0, 0.8]}, "red, green, blue are multiplied by 1.25, 1.00, 0.80"),
     ):
         print_refinement(summary | changes)
         assert told in capsys.readouterr().out
