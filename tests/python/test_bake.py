@@ -169,9 +169,7 @@ def test_points_move_onto_the_level_set_and_never_away():
     assert np.linalg.norm(moved - points, axis=1).max() < 0.0201
     assert (np.abs(np.linalg.norm(moved, axis=1) - 1) <= np.abs(np.linalg.norm(points, axis=1) - 1) + 1e-6).all()
     across = np.float32(np.cross(directions, [0.0, 0.0, 1.0]))
-    assert np.array_equal(
-        to_level_set(squares, points, 0.2, across / np.linalg.norm(across, axis=1, keepdims=True)), points
-    )
+    assert np.array_equal(to_level_set(squares, points, 0.2, across / np.linalg.norm(across, None, 1, True)), points)
 
 
 def test_materials_that_are_not_finite_are_refused():

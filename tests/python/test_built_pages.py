@@ -15,9 +15,7 @@ def test_it_was_built_from_the_sources():
     """Where this fails: `make viewer`. The hash is computed as in build.mjs."""
     text = (TOOLS / "report/pages.js").read_text(encoding="utf-8")
     named = re.match(r"/\* sources [0-9a-f]{64}: (.*)", text)[1].split()  # after the tools that made it
-    assert {Path(path).name for path in named} >= {
-        path.name for path in PAGES.glob("*/*.js") if "node" not in str(path)
-    }
+    assert {Path(x).name for x in named} >= {x.name for x in PAGES.glob("*/*.js") if "node" not in str(x)}
     digest = hashlib.sha256()
     for path in [*BUILD, *(PAGES / name for name in named)]:
         digest.update(f"{path.relative_to(PAGES).as_posix()}\n".encode() + path.read_bytes())

@@ -27,9 +27,7 @@ class Photos:
     def __init__(self, poses: list[np.ndarray] | None = None, offsets: dict[int, np.ndarray] | None = None):
         self.poses = poses_around(np.zeros(3), 1.0, COUNT) if poses is None else poses
         self.alphas = [
-            np.max(
-                [sphere_alpha(pose, np.add(centre, (offsets or {}).get(i, 0)), r, SIZE) for centre, r in BALLS], axis=0
-            )
+            np.max([sphere_alpha(pose, np.add(centre, (offsets or {}).get(i, 0)), r, SIZE) for centre, r in BALLS], 0)
             for i, pose in enumerate(self.poses)
         ]
         self.linear = [np.full((SIZE, SIZE, 3), LINEAR, np.float32) for _ in self.poses]

@@ -124,9 +124,7 @@ def test_without_ray_one_line_says_what_to_install(tmp_path, monkeypatch, capsys
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("error", "said"), [(KeyboardInterrupt, "interrupted"), (OSError("Why"), "Ray does not start")]
-)
+@pytest.mark.parametrize("error, said", [(KeyboardInterrupt, "interrupted"), (OSError("Why"), "Ray does not start")])
 def test_ray_that_does_not_start_is_one_line(tmp_path, monkeypatch, capsys, error, said):
     ray = Mock(__spec__=ModuleSpec("ray", None), **{"init.side_effect": error})
     monkeypatch.setitem(sys.modules, "ray", ray)

@@ -86,9 +86,7 @@ def test_solid_angles_are_those_of_the_sphere():
         density = directions.abs().sum(1) ** 3 * 4 / n**2  # du dv / |p|^3 at the centre; folded texels differ most
         torch.testing.assert_close(angles, density, rtol=2.5 / n, atol=0)
         second = torch.einsum("n,ni,nj->ij", angles, directions, directions)
-        torch.testing.assert_close(
-            second, torch.eye(3, dtype=torch.float64) * (4 * math.pi / 3), rtol=0, atol=20 / n**2
-        )
+        torch.testing.assert_close(second, 4 * math.pi / 3 * torch.eye(3, dtype=torch.float64), rtol=0, atol=20 / n**2)
 
 
 def test_four_texels_cover_the_one_that_they_halve():

@@ -120,9 +120,7 @@ def ends_well(scene: Drawn, run: Path, ended: SimpleNamespace) -> str:
         return said[0]
     assert not said, (scene.words, said)
     asset, light = read_asset(run / "mesh.glb"), read_radiance(run / "environment.exr")
-    assert np.isfinite(asset.vertices).all() and np.isfinite(asset.normals).all() and np.isfinite(light).all(), (
-        scene.words
-    )
+    assert all(np.isfinite(x).all() for x in (asset.vertices, asset.normals, light)), scene.words
     forbidden = lambda word: pytest.fail(f"{scene.words}: {word} in evaluation.json")
     json.loads((run / "evaluation.json").read_text(), parse_constant=forbidden)
     assert all(np.isfinite(line["loss"]) for line in lines_of(run)), scene.words

@@ -203,9 +203,7 @@ def test_observers_learn_of_all_that_happens(data, tmp_path):
     heard = asking.heard
     assert heard[0] == ("begun", 0)
     assert [event for event in heard if event[0] == "step"] == [("step", n) for n in range(period, 41, period)]
-    assert [event[1] for event in heard if event[0] == "logged"] == [
-        line["step"] for line in lines_of(tmp_path / "run")
-    ]
+    assert [e[1] for e in heard if e[0] == "logged"] == [line["step"] for line in lines_of(tmp_path / "run")]
     assert [event for event in heard if event[0] == "previewed"] == [("previewed", 20, True), ("previewed", 40, True)]
     assert heard[-2:] == [("export", None), ("evaluation", True)]
     assert second.heard == heard

@@ -195,9 +195,7 @@ def test_a_model_begins_as_it_is_set():
         assert models[-1].material(inputs)[1].item() == pytest.approx(0.2)
         assert models[-1].s_value == pytest.approx(math.exp(4.5), rel=1e-5)
     points = torch.rand(20, 3)
-    torch.testing.assert_close(
-        models[0].sdf_field.sdf(points) - models[1].sdf_field.sdf(points), torch.full((20,), 0.2)
-    )
+    torch.testing.assert_close(models[0].sdf_field.sdf(points) - models[1].sdf_field.sdf(points), torch.full([20], 0.2))
     torch.manual_seed(0)
     assert SceneModel(tiny(table_dtype="float16")).sdf_field.grid.stored().dtype == torch.float16
 
