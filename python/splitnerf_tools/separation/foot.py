@@ -29,7 +29,8 @@ GAP = 3  # cells that close holes in what stands over the foot
 # What the height of a cell counts beside a neighbour of its own colour, on a map of MOST cells along the edge.
 HINT = 0.02
 UNDER = 10.0  # how much more it counts where the cell is high and the object is over it
-CONTRAST = 33.0  # of colours, see :func:`splitnerf_tools.separation.walker.random_walk`
+# Of the logarithms of colours, which differ by as much in a shadow as beside it, see `walker.random_walk`.
+CONTRAST, DARKEST = 20.0, 0.05
 
 
 class Foot:
@@ -81,7 +82,8 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     hidden = over & (counts == 0)
     weights = _smoothed(weights, np.ones_like(weights))
     known = (weights > SPARSE) & ~hidden
-    inside = random_walk(HINT * (MOST / n) ** 2 * _by_height(medians, counts, over), colour, known, CONTRAST) - 0.5
+    hints = HINT * (MOST / n) ** 2 * _by_height(medians, counts, over)
+    inside = random_walk(hints, np.log(colour + DARKEST), known, CONTRAST) - 0.5
     # What no photo shows is within the foot.
     inside[ndimage.binary_fill_holes((inside > 0) | hidden) & ~known & ~hidden] = 0.5
     return Foot(table, inside, np.where(hidden, 1.0, -1.0).astype(np.float32))
