@@ -65,9 +65,7 @@ def test_torch_is_chosen_for_each_machine(locked):
 
 
 def test_what_the_program_requires_has_a_listed_licence(project):
-    listed = re.findall(
-        r"^\| ([a-z0-9-]+) \| [^|]+ \| ([^|]+) \|", (ROOT / "docs" / "licences.md").read_text(), re.MULTILINE
-    )
+    listed = re.findall(r"^\| ([a-z0-9-]+) \| [^|]+ \| ([^|]+) \|", (ROOT / "docs" / "licences.md").read_text(), re.M)
     licences = dict(listed)
     needed = {canonicalize_name(Requirement(line).name) for line in project["project"]["dependencies"]}
     assert needed - {"tomli"} <= set(licences), "run python third_party/list_licences.py"

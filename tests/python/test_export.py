@@ -102,9 +102,7 @@ def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     assert pbr["baseColorFactor"] == pytest.approx([0.5, 0.25, 1.0, 1.0])
     assert (pbr["roughnessFactor"], pbr["metallicFactor"]) == pytest.approx((0.9, 0.8))
     assert material["occlusionTexture"]["index"] == pbr["metallicRoughnessTexture"]["index"]
-    assert {image["name"] for image in document["images"]} == {
-        f"{asset.name}_{k}" for k in ("basecolor", "orm", "normal")
-    }
+    assert {x["name"] for x in document["images"]} == {f"{asset.name}_{k}" for k in ("basecolor", "orm", "normal")}
     assert {part[0]["name"] for part in (document[k] for k in ("nodes", "meshes", "materials"))} == {asset.name}
     stored = asset.materials[0]
     albedo = image_of(document, binary, pbr["baseColorTexture"]["index"]) / 255

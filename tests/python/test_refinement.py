@@ -205,9 +205,7 @@ def refined(painted):
     start = texels.start.clone()
     start[:, :3], start[:, 3] = 0.35, 0.5
     wrong = texels.asset_with(texels.maps(start))
-    settings = FitSettings(
-        14, sweep_share=1.0, light_step=0.0, pixels=2000, directions=16, outline=False, albedo_size=0
-    )
+    settings = FitSettings(14, sweep_share=1, light_step=0, pixels=2000, directions=16, outline=False, albedo_size=0)
     return wrong, refine(data, wrong, sky(), settings)
 
 

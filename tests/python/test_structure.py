@@ -32,9 +32,7 @@ def unit(module: str) -> str:
 
 def wrong_way(imports: Imports) -> list[str]:
     """The imports that run up the layers, or from the core to the tools."""
-    level = {
-        f"{package}.{name}": i for package, lines in LAYERS.items() for i, line in enumerate(lines) for name in line
-    }
+    level = {f"{part}.{name}": i for part, lines in LAYERS.items() for i, line in enumerate(lines) for name in line}
 
     def allowed(module: str, imported: str) -> bool:
         here, there = (name.partition(".")[0] for name in (module, imported))

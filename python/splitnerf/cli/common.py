@@ -153,10 +153,10 @@ def reading_of(args: argparse.Namespace, target: Path) -> Reading:
 
 
 class Stages:
-    """An observer that says which stage of a run begins, what ends it, and where the results go."""
+    """An observer that says which stage of a run begins, what ends it, how long it still takes, and where the results go."""
 
     def __init__(self) -> None:
-        self._names, self._started = ["training"], time.monotonic()
+        self._names, self._started, self._limit = ["training"], time.monotonic(), 0
 
     def __call__(self, event: Event) -> None:
         if event.kind == "begun":
@@ -165,6 +165,7 @@ class Stages:
             training, run, n = event.training, event.training.config.run, torch.get_num_threads()
             refinement = ["refinement"] if training.config.refinement.enabled else []
             self._names = ["training", "export", *refinement, "evaluation"]
+            self._limit = round(60 * run.max_minutes)
             cpu = f"{n} thread{'s' * (n > 1)} of the CPU"
             total, free = (f"{size / 1e9:.3g}" for size in memory_bytes())
             where = f"{cpu if training.model.device.type == 'cpu' else 'the GPU'}, {free} of {total} GB of memory free"
@@ -173,8 +174,10 @@ class Stages:
             if not training.finished:
                 self._say("training", f" on {where}; in all {ends}; results go to {plain(str(training.run))}")
         elif event.kind in self._names:
-            minutes, seconds = divmod(round(time.monotonic() - self._started), 60)
-            self._say(event.kind, f", after {minutes}:{seconds:02d} minutes")
+            spent = round(time.monotonic() - self._started)
+            left = self._limit - spent
+            to_come = " and {}:{:02d} to come".format(*divmod(left, 60)) if left > 0 else ""
+            self._say(event.kind, ", after {}:{:02d} minutes".format(*divmod(spent, 60)) + to_come)
 
     def _say(self, name: str, more: str) -> None:
         print(f"stage {self._names.index(name) + 1} of {len(self._names)}: {name}{more}", file=sys.stderr, flush=True)
@@ -198,10 +201,8 @@ def print_refinement(summary: dict | None) -> None:
     """A line with the changes by the refinement, if there was one."""
     if summary is None:
         return
-    changes = [
-        "colours {:.2f} -> {:.2f} dB".format(*summary["photos_psnr"]),
-        "of photos held out {:.2f} -> {:.2f} dB".format(*summary["held_out_psnr"]),
-    ]
+    psnr = "{} {:.2f} -> {:.2f} dB".format
+    changes = [psnr("colours", *summary["photos_psnr"]), psnr("of photos held out", *summary["held_out_psnr"])]
     if summary["outline_error"]:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
     print(f"refinement, on the photos: {', '.join(changes)}, at step {summary['steps']}, {summary['seconds']:.0f} s")
@@ -226,8 +227,7 @@ def print_scores(evaluation: dict) -> None:
 
     words = {row["place"][0]: f" ({row['word']})" for row in graded(evaluation)}
     for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):
-        scores = evaluation.get(key)
-        if scores:
+        if scores := evaluation.get(key):
             lpips = "" if scores["lpips"] is None else f", LPIPS {scores['lpips']:.4f}"
             print(f"{name:22s} PSNR {scores['psnr']:.2f} dB, SSIM {scores['ssim']:.4f}{lpips}{words[key]}")
     for name, key, unit in (
