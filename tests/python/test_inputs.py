@@ -115,7 +115,7 @@ def test_channels_are_found_by_their_names(tmp_path, capsys, names):
 
 def test_an_image_of_luminance_and_differences_of_colours_is_refused(tmp_path, capsys):
     write_exr(tmp_path / "x.exr", np.ones((4, 4, 3), np.float32), ("Y", "RY", "BY"))
-    with pytest.raises(InputError, match=r"x.exr: holds luminance .*; re-export it as RGB"):
+    with pytest.raises(InputError, match=r"x.exr: holds luminance .*; re-export it as R, G, B"):
         read_image(tmp_path / "x.exr")
     for names, is_said in (("RB", True), ("Z", True), ("Y", False)):
         errors._said.clear()

@@ -438,7 +438,7 @@ class TestOutline:
         mask[:, :20] = 1  # goes on beyond the photo's edges
         photo = np.where(np.arange(40)[None, :, None] < 30, 0.2, 0.8) * np.ones((40, 1, 3))
         found = at_edges(mask, photo.astype(np.float32))
-        assert (found[:, :18] == 1).all() and (found[:, 22:] == 0).all() and found.shape == mask.shape
+        assert (found[:, :17] == 1).all() and (found[:, 23:] == 0).all() and found.shape == mask.shape
 
     @pytest.mark.parametrize("value", [0.0, 1.0])
     def test_without_an_edge(self, value):
