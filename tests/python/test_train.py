@@ -231,13 +231,13 @@ def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch
     assert said == [f"stage {number} of 4: {name}" for number, name in enumerate(names, 1)]
 
 
-def test_stages_say_how_long_the_rest_takes(monkeypatch, capsys):
-    monkeypatch.setattr("splitnerf.cli.common.time", Mock(monotonic=iter([0.0, 384.4, 500.0]).__next__))
-    stages, training = Stages(), Mock(finished=True, **{"config.run.max_minutes": 8.0})
+def test_stages_say_how_long_the_rest_takes_after_masks_and_a_resume(monkeypatch, capsys):
+    monkeypatch.setattr("splitnerf.cli.common.time", Mock(monotonic=iter([0.0, 100.0, 424.4, 600.0]).__next__))
+    stages, training = Stages(), Mock(finished=False, seconds=60.0, **{"config.run.max_minutes": 8.0})
     for kind in ("begun", "refinement", "evaluation"):
         stages(Mock(kind=kind, training=training))
-    said = ["refinement, after 6:24 minutes and 1:36 to come", "evaluation, after 8:20 minutes"]
-    assert capsys.readouterr().err.splitlines() == [f"stage {i} of 4: {words}" for i, words in enumerate(said, 3)]
+    said = ["refinement, after 7:04 minutes and 1:36 to come", "evaluation, after 10:00 minutes"]
+    assert capsys.readouterr().err.splitlines()[1:] == [f"stage {i} of 4: {words}" for i, words in enumerate(said, 3)]
 
 
 def test_a_run_that_is_stopped_delivers_and_can_go_on(data, tmp_path):

@@ -156,7 +156,7 @@ class Stages:
     """An observer that says which stage of a run begins, what ends it, how long it still takes, and where the results go."""
 
     def __init__(self) -> None:
-        self._names, self._started, self._limit = ["training"], time.monotonic(), 0
+        self._names, self._started, self._end = ["training"], time.monotonic(), 0.0
 
     def __call__(self, event: Event) -> None:
         if event.kind == "begun":
@@ -165,7 +165,7 @@ class Stages:
             training, run, n = event.training, event.training.config.run, torch.get_num_threads()
             refinement = ["refinement"] if training.config.refinement.enabled else []
             self._names = ["training", "export", *refinement, "evaluation"]
-            self._limit = round(60 * run.max_minutes)
+            self._end = 0.0 if training.finished else time.monotonic() + 60 * run.max_minutes - training.seconds
             cpu = f"{n} thread{'s' * (n > 1)} of the CPU"
             total, free = (f"{size / 1e9:.3g}" for size in memory_bytes())
             where = f"{cpu if training.model.device.type == 'cpu' else 'the GPU'}, {free} of {total} GB of memory free"
@@ -174,8 +174,8 @@ class Stages:
             if not training.finished:
                 self._say("training", f" on {where}; in all {ends}; results go to {plain(str(training.run))}")
         elif event.kind in self._names:
-            spent = round(time.monotonic() - self._started)
-            left = self._limit - spent
+            now = time.monotonic()
+            spent, left = round(now - self._started), round(self._end - now)
             to_come = " and {}:{:02d} to come".format(*divmod(left, 60)) if left > 0 else ""
             self._say(event.kind, ", after {}:{:02d} minutes".format(*divmod(spent, 60)) + to_come)
 
