@@ -165,7 +165,7 @@ class Stages:
             training, run, n = event.training, event.training.config.run, torch.get_num_threads()
             refinement = ["refinement"] if training.config.refinement.enabled else []
             self._names = ["training", "export", *refinement, "evaluation"]
-            self._end = 0.0 if training.finished else time.monotonic() + 60 * run.max_minutes - training.seconds
+            self._end = training.started + 60 * run.max_minutes
             cpu = f"{n} thread{'s' * (n > 1)} of the CPU"
             total, free = (f"{size / 1e9:.3g}" for size in memory_bytes())
             where = f"{cpu if training.model.device.type == 'cpu' else 'the GPU'}, {free} of {total} GB of memory free"
