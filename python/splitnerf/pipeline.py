@@ -182,7 +182,8 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
         clock = time.monotonic()
         discard_refinement(run)
         try:
-            mesh = write_assets(run, model, dataset.box_from_world, Cameras.of(dataset), name=asset_name(run)).mesh
+            where = dataset.box_from_world, Cameras.of(dataset)
+            mesh = write_assets(run, model, *where, name=asset_name(run), ground=dataset.ground).mesh
         except EmptyMesh as error:
             failure = error
         timings["export"] = time.monotonic() - clock
@@ -354,6 +355,7 @@ def export_run(
                 formats=formats,
                 name=asset_name(run),
                 placing=placing,
+                ground=None if content.get("ground") is None else content["ground"].numpy(),
             )
         if out.resolve() != run.resolve():
             known, _ = read_place(run) or (np.zeros(3), 1.0)

@@ -1,5 +1,6 @@
 """Damaged and hostile files in one table: the damage to a good one, and the line that names it. No crash, little memory."""
 
+import json
 import shutil
 import struct
 import zlib
@@ -159,6 +160,17 @@ NERFSTUDIO = {
     "lens that folds": (keys(k1=-900.0), "its lens, undistorted, covers .% of the image"),
 }
 
+
+def ground(**content: object) -> Damage:
+    return lambda root: (root / "ground.json").write_text(json.dumps(content))
+
+
+GROUND = {
+    "no normal": (ground(offset=0), "ground.json: is no plane"),
+    "two numbers": (ground(normal=[0, 1], offset=0), "ground.json: is no plane"),
+    "not of length 1": (ground(normal=[0, 0, 2], offset=0), "ground.json: is no plane"),
+    "no offset": (ground(normal=[0, 0, 1], offset="low"), "ground.json: is no plane"),
+}
 
 METADATA = "train_003/metadata.json"
 
@@ -421,6 +433,7 @@ LOADED = lambda folder, _: load_dataset(folder)
 FORMS = {  # what writes a good folder, what reads it or the path that the damage gives, and the table of damages
     "transforms": (make_blender, LOADED, TRANSFORMS),
     "nerfstudio": (lambda root: write_transforms(root, masks=True), LOADED, NERFSTUDIO),
+    "ground": (make_blender, LOADED, GROUND),
     "view folders": (make_folders, LOADED, VIEW_FOLDERS),
     "COLMAP, binary": (lambda root: write_colmap(root, binary=True), LOADED, COLMAP | BINARY),
     "COLMAP, text": (lambda root: write_colmap(root, binary=False), LOADED, COLMAP | {"one camera twice": TWICE}),

@@ -209,7 +209,7 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     assert main(["export", str(run), *options]) == DONE
     line = capsys.readouterr().out.splitlines()[0]
     assert line.startswith("mesh: watertight, 1000 faces of ")
-    assert line.endswith(", 0 floating or enclosed components dropped")
+    assert line.endswith(", 0 floating, enclosed or unseen components dropped")
     files = "mesh.glb mesh.ply mesh.obj mesh.mtl environment.exr environment.hdr".split()
     maps = [f"mesh_{name}.png" for name in ("albedo", "roughness", "metallic", "normal")]
     assert {p.name for p in out.iterdir()} == {*files, *maps}

@@ -10,7 +10,14 @@ import trimesh
 from splitnerf import _core
 from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.export.simplify import capped, decimate, drop_floaters_and_cavities, is_closed, split_pinches
+from splitnerf.export.simplify import (
+    capped,
+    decimate,
+    drop_floaters_and_cavities,
+    drop_unseen,
+    is_closed,
+    split_pinches,
+)
 from splitnerf.export.textured import textured_asset
 from splitnerf.ops import MeshScene
 from splitnerf.render.seen import GRAZING, Cameras, in_view, majority, seen_vertices
@@ -285,13 +292,18 @@ def test_a_flat_rim_gets_a_flat_cap():
     assert is_closed(mesh.faces) and disc.volume == pytest.approx(expected, rel=0.03)
 
 
-def test_bodies_that_no_photo_shows_stay():
+def test_a_body_that_no_photo_shows_goes():
+    """Or of which a twentieth is shown. Where nothing is shown at all, all stays, and nothing becomes a cap."""
     mesh = round_body(0.5) + round_body(0.5, 2.0)
     n = len(mesh.vertices) // 2
-    flags = np.arange(2 * n) < n
-    for seen in (flags, ~flags | flags, flags & False):
-        moved, stays = capped(np.float32(mesh.vertices), mesh.faces, seen)
-        assert np.array_equal(moved, np.float32(mesh.vertices)) and stays.all()
+    number = np.arange(2 * n)
+    for shown, left in ((n, 1), (n + n // 20, 1), (n + n // 5, 2), (2 * n, 2), (0, 2)):
+        vertices, faces, seen, dropped = drop_unseen(np.float32(mesh.vertices), mesh.faces, number < shown)
+        assert (len(vertices), len(faces), dropped) == (left * n, left * len(mesh.faces) // 2, 2 - left)
+        assert np.array_equal(vertices, np.float32(mesh.vertices[: left * n])) and is_closed(faces)
+        assert np.array_equal(seen, number[: left * n] < shown)
+    moved, stays = capped(vertices, faces, seen)
+    assert np.array_equal(moved, vertices) and stays.all()
 
 
 def test_a_cap_keeps_its_places_and_normals():

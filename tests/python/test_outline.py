@@ -9,6 +9,7 @@ import torch
 import trimesh
 from painted_ball import PHOTO, photos, sky, textured, with_textures
 from splitnerf.data.environment import directions_of_texels
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear, write_image
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
 from splitnerf.refinement import outline
@@ -26,7 +27,7 @@ from splitnerf.refinement.lamps import (
     unit,
     with_lamp,
 )
-from splitnerf.refinement.outline import fit_outline, outline_pixels, slopes, weld
+from splitnerf.refinement.outline import by_colours, fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.stage import Stage
 from splitnerf.refinement.texels import AssetTexels
@@ -181,6 +182,49 @@ def test_a_dented_outline_is_found(pair):
     assert errors[-1] < 0.2 * errors[0]
     normals = [np.cross(*np.diff(a.vertices[a.triangles], axis=1).transpose(1, 0, 2)) for a in (asset, found)]
     assert (normals[0] * normals[1]).sum(axis=1).min() > 0 and weld(found.vertices).max() == place.max()
+
+
+def test_an_outline_stays_above_the_ground(ball, painted):
+    ground = np.array([0, 0, 1, -0.8])
+    found, _ = fit_outline(replace(painted[1], ground=ground), replace(ball, vertices=0.96 * ball.vertices))
+    assert found.vertices[:, 2].min() == pytest.approx(-0.8, abs=1e-6) and found.vertices[:, 2].max() > 0.98
+
+
+def test_an_outline_is_where_colours_before_a_known_background_say(ball, painted, tmp_path):
+    """The masks are those of a ball that is too small."""
+    true, small = painted[1], replace(ball, vertices=0.96 * ball.vertices)
+    alpha = np.array(true.images)[..., 3:]
+    whole = linear_to_srgb(srgb_to_linear(np.array(true.images)[..., :3]) * alpha + 0.9 * (1 - alpha))
+    write_image(
+        tmp_path / "behind.png",
+        np.float32([*linear_to_srgb(np.float32([0.9] * 3)), 1]) + np.zeros((PHOTO, PHOTO, 4), np.float32),
+    )
+    masks = np.array(photos(small, sky(), n=len(true), spp=16).images)[..., 3:]
+    data = replace(true, images=np.concatenate([whole, masks], -1), behind_paths=[tmp_path / "behind.png"] * len(true))
+    size = [
+        np.linalg.norm(fit_outline(replace(data, whole=told), small)[0].vertices, axis=1).mean()
+        for told in (True, False)
+    ]
+    assert size == pytest.approx([0.98, 0.96], abs=0.006)  # masks count, too
+
+
+def test_colours_before_a_known_background_tell_the_coverage():
+    """A straight edge whose mask is wrong by a pixel and a half. Light mixes linearly; a photo has its own exposure."""
+    inner, outer, exposure = np.float32([0.6, 0.2, 0.1]), np.float32([0.1, 0.2, 0.4]), np.float32([0.5, 0.5, 0.5])
+    true = (np.arange(64) - 30.3).clip(0, 1)[None].repeat(40, 0).astype(np.float32)
+    mask = (np.arange(64) - 28.8).clip(0, 1)[None].repeat(40, 0).astype(np.float32)
+    colour = linear_to_srgb(true[..., None] * inner + (1 - true[..., None]) * outer)
+    behind = np.concatenate([np.broadcast_to(linear_to_srgb(outer * exposure), (40, 64, 3)), np.ones((40, 64, 1))], -1)
+    behind[20:, :, 3] = 0
+    behind[:5, :, :3] = 1
+    found = by_colours(np.dstack([colour, mask]), behind.astype(np.float32), exposure)
+    assert np.abs(found - true)[5:20].max() < 0.3 < 0.9 < np.abs(mask - true).max()
+    np.testing.assert_array_equal(found[20:], mask[20:])  # it is unknown there
+    np.testing.assert_array_equal(found[:5], mask[:5])  # and clipped there
+    alike = by_colours(
+        np.dstack([np.full_like(colour, 0.5), mask]), np.full((40, 64, 4), 0.5, np.float32), exposure / exposure
+    )
+    assert np.abs(alike - mask).max() < 0.1  # colours that do not differ say nothing
 
 
 # ---- lamps ----

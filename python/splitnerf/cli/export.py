@@ -83,7 +83,9 @@ def run(args: argparse.Namespace) -> int:
         overwrite=args.overwrite,
     )
     closed = "watertight" if exported.watertight else "not watertight"
-    dropped = f"{exported.n_dropped} floating or enclosed component{'' if exported.n_dropped == 1 else 's'} dropped"
+    dropped = (
+        f"{exported.n_dropped} floating, enclosed or unseen component{'' if exported.n_dropped == 1 else 's'} dropped"
+    )
     print(f"mesh: {closed}, {exported.n_faces} faces of {len(exported.mesh.faces)}, {dropped}")
     if exported.origin.any() or exported.scale != 1:
         where = ", ".join(f"{x:.6g}" for x in exported.origin)

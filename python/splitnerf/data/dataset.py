@@ -34,6 +34,7 @@ from splitnerf.errors import InputError, note_once
 from splitnerf.progress import tracked
 
 SURROUNDINGS = "surroundings.exr"
+GROUND = "ground.json"
 BEHIND = "behind"  # the folder of what is behind the object, in that of separated data
 EXPOSURES = "exposures.json"  # in a run: the exposures of photos that it learned
 JPEG = (".jpg", ".jpeg")
@@ -71,6 +72,8 @@ class Dataset:
             one of `exposures`.
         surroundings: [h, 2 h, 4] float32, equirectangular: linear radiance that the photos see around the object, and how
             well it was seen, in [0, 1]; None where the data have no such map.
+        ground: [4] float64, the unit normal of a plane and its product with the plane's points, in the data's world: nothing of
+            the object lies below it; None where the data have no such plane.
         light_turns: [n, 3, 3] float32, the rotations that carry directions of the internal frame to those in which the light
             stands still; None where it stands still in the internal frame. On a turntable each photo has its own.
         behind_paths: The files of :meth:`behind`, or None for photos without.
@@ -94,6 +97,7 @@ class Dataset:
     exposures: np.ndarray | None = None
     stated: np.ndarray | None = None
     surroundings: np.ndarray | None = None
+    ground: np.ndarray | None = None
     light_turns: np.ndarray | None = None
     behind_paths: list[Path | None] | None = None
     masked: bool = True
@@ -297,7 +301,8 @@ def load_dataset(
         origin=origin,
         exposures=loader.exposures,
         stated=np.array([frame.exposure for frame in frames]),
-        surroundings=_surroundings(root, reading),
+        surroundings=read_surroundings(path) if (path := _found(SURROUNDINGS, root, reading)) else None,
+        ground=_read_ground(path) if (path := _found(GROUND, root, reading)) else None,
         light_turns=_light_turns(frames),
         behind_paths=behind_paths,
         masked=_has_masks(photos),
@@ -305,11 +310,29 @@ def load_dataset(
     )
 
 
-def _surroundings(root: Path, reading: Reading) -> np.ndarray | None:
-    """The map of what is around the object: the data's own, else that of what training separated."""
+def _found(name: str, root: Path, reading: Reading) -> Path | None:
+    """A file of what is around the object: the data's own, else that of what training separated; None without both."""
     folders = [root] if reading.separated is None else [root, reading.separated]
-    path = next((folder / SURROUNDINGS for folder in folders if (folder / SURROUNDINGS).is_file()), None)
-    return None if path is None else read_surroundings(path)
+    return next((folder / name for folder in folders if (folder / name).is_file()), None)
+
+
+def write_ground(folder: Path, plane: np.ndarray) -> None:
+    """Writes the plane [4] on which the object stands, see :class:`Dataset`."""
+    write_json(folder / GROUND, {"normal": plane[:3].tolist(), "offset": float(plane[3])})
+
+
+def _read_ground(path: Path) -> np.ndarray:
+    """The plane of a file. Raises InputError where it is none."""
+    content = read_json(path, "normal")
+    try:
+        normal, offset = np.array(content["normal"], np.float64), float(content["offset"])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        normal, offset = np.zeros(3), np.nan
+    if normal.shape != (3,) or not abs(np.linalg.norm(normal) - 1) < 1e-3 or not np.isfinite(offset):
+        raise InputError(
+            f"{path}: is no plane: 'normal' of three numbers, of length 1, and 'offset'; repair or delete it"
+        )
+    return np.append(normal, offset)
 
 
 def _behind_path(frame: Frame, root: Path, reading: Reading) -> Path | None:
@@ -334,7 +357,7 @@ def dataset_fingerprint(dataset: Dataset) -> str:
     digest = hashlib.sha256()
     digest.update(json.dumps([dataset.split, dataset.frame_names, list(dataset.images.shape)]).encode())
     shares = [] if dataset.known is None else [dataset.known.mean(axis=(1, 2))]
-    shares += [] if dataset.light_turns is None else [dataset.light_turns]
+    shares += [x for x in (dataset.light_turns, dataset.ground) if x is not None]
     step = max(1, min(dataset.height, dataset.width) // MEAN_EDGE)
     means = np.stack([dataset.images[i, ::step, ::step].mean(axis=(0, 1)) for i in range(len(dataset))])
     for values in (dataset.poses, dataset.intrinsics, means, *shares):

@@ -138,6 +138,12 @@ def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (points @ matrix[:3, :3].T + matrix[:3, 3]).astype(points.dtype)
 
 
+def transform_plane(matrix: np.ndarray, plane: np.ndarray) -> np.ndarray:
+    """A plane [4], its unit normal and that one's product with the plane's points, where a [4, 4] similarity without a rotation
+    brings it."""
+    return np.append(plane[:3], matrix[0, 0] * plane[3] + plane[:3] @ matrix[:3, 3])
+
+
 def first_centre(silhouettes: Sequence[np.ndarray], poses: np.ndarray, intrinsics: np.ndarray) -> np.ndarray:
     """The point [3] nearest to all optical axes or, where these are about parallel, to the rays through the middles of
     the silhouettes; arguments as for `estimate_box`, float64."""

@@ -15,10 +15,10 @@ from torch import Tensor
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.images import linear_to_srgb, to_uint8, write_image
-from splitnerf.data.normalisation import transform_points
+from splitnerf.data.normalisation import transform_plane, transform_points
 from splitnerf.data.truth import read_mesh
 from splitnerf.export.meshing import extract_mesh
-from splitnerf.export.simplify import capped, drop_floaters_and_cavities, is_closed
+from splitnerf.export.simplify import capped, drop_floaters_and_cavities, drop_unseen, is_closed
 from splitnerf.export.surface import Surface, surface_materials
 from splitnerf.export.textured import textured_asset
 from splitnerf.export.writers import require_usd, write_glb, write_obj, write_usdz
@@ -33,7 +33,7 @@ FORMATS = ("glb", "ply", "obj", "usdz")
 @dataclass(frozen=True)
 class Exported:
     """What was exported: the mesh before decimation, in the data's world; the number of faces of the textured mesh
-    (that of `mesh` where no format has textures) and whether it is closed; the number of floating or enclosed components
+    (that of `mesh` where no format has textures) and whether it is closed; the number of floating, enclosed or unseen components
     that were removed; and the point [3] of the data's world that is the origin of the files, and their units for one of it."""
 
     mesh: trimesh.Trimesh
@@ -109,6 +109,7 @@ def write_assets(
     formats: Sequence[str] = ("glb", "ply"),
     name: str = "object",
     placing: Placing = Placing(),
+    ground: np.ndarray | None = None,
 ) -> Exported:
     """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder.
 
@@ -122,6 +123,7 @@ def write_assets(
         formats: Out of :data:`FORMATS`.
         name: What the mesh, its material and its images are called.
         placing: Where the files have the asset.
+        ground: See :class:`splitnerf.data.dataset.Dataset`; the asset ends there.
 
     Raises:
         EmptyMesh: The surface is empty.
@@ -133,11 +135,14 @@ def write_assets(
     if "usdz" in formats:
         require_usd()
     surface = surface_of(model)
+    if ground is not None:
+        surface = above(surface, transform_plane(box_from_world, ground))
     with Progress(0.0, leave=False, at_once=True) as bar:
         bar.show(0.0, f"export, surface on a grid of {resolution}^3")
         vertices, faces, n_dropped = drop_floaters_and_cavities(*extract_mesh(surface.sdf, c.constants.box, resolution))
         spacing = 2.0 * c.constants.box / (resolution - 1)
         seen = seen_vertices(vertices, faces, cameras, 0.25 * spacing)
+        vertices, faces, seen, n_unseen = drop_unseen(vertices, faces, seen)
         vertices, on_surface = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
@@ -165,7 +170,7 @@ def write_assets(
             placed = trimesh.Trimesh((mesh.vertices - origin) * scale, faces, process=False)
             write_mesh_ply(out / "mesh.ply", placed, surface_materials(surface, vertices)[0])
         write_environment(out, model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy())
-    return Exported(mesh, n_textured, watertight, n_dropped, origin, scale)
+    return Exported(mesh, n_textured, watertight, n_dropped + n_unseen, origin, scale)
 
 
 def write_mesh_ply(path: Path, mesh: trimesh.Trimesh, albedo: np.ndarray | None = None) -> None:
@@ -183,6 +188,19 @@ def write_environment(folder: Path, radiance: np.ndarray) -> None:
     half = bool(radiance.max() <= np.finfo(np.float16).max)
     write_image(folder / "environment.exr", radiance, half=half)
     write_image(folder / "environment.hdr", radiance)
+
+
+def above(surface: Surface, plane: np.ndarray) -> Surface:
+    """A surface cut off at a plane [4], in its own frame; the cut faces down, its materials are those that the fields have there."""
+    normal, offset = torch.tensor(plane[:3]).float(), float(plane[3])
+
+    def gradient(points: Tensor) -> tuple[Tensor, Tensor]:
+        depth, (sdf, slope) = offset - points @ normal, surface.gradient(points)
+        return torch.maximum(sdf, depth), torch.where((depth > sdf)[:, None], -normal, slope)
+
+    return dataclasses.replace(
+        surface, sdf=lambda points: torch.maximum(surface.sdf(points), offset - points @ normal), gradient=gradient
+    )
 
 
 def surface_of(model: SceneModel) -> Surface:

@@ -1,5 +1,5 @@
-"""Simplifies an extracted mesh: removes floaters and cavities, caps what no photo shows, reduces the number of faces; a
-closed mesh stays closed."""
+"""Simplifies an extracted mesh: removes floaters, cavities and what hangs where no photo looks, caps what no photo shows, reduces
+the number of faces; a closed mesh stays closed."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from scipy.sparse.linalg import cg
 from trimesh.graph import connected_component_labels
 
 MIN_COMPONENT = 0.01  # share of the largest component's faces
+LEAST_SEEN = 0.1  # share of a component's vertices that photos must show
 # The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
 AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
@@ -33,9 +34,23 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
     return vertices, faces, int(dropped.sum())
 
 
+def drop_unseen(
+    vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Removes connected components of whose vertices less than a tenth is `seen` [n], unless all are such.
+
+    Returns:
+        vertices [n, 3], faces [m, 3], `seen` of these vertices, and the number of removed components.
+    """
+    label = connected_component_labels(trimesh.geometry.faces_to_edges(faces), len(vertices))
+    shown = np.bincount(label, seen) >= LEAST_SEEN * np.bincount(label)
+    kept = (shown | ~shown.any())[label]
+    return *_compact(vertices, faces[kept[faces[:, 0]]]), seen[kept], len(np.unique(label[~kept]))
+
+
 def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Moves the vertices [n, 3] that are not `seen` [n] on to a membrane between those seen: each into the middle of
-    its neighbours. A flat rim gets a flat cap. Components without seen vertices stay as they are.
+    its neighbours. A flat rim gets a flat cap. Without any seen vertex all stay as they are.
 
     Returns:
         vertices [n, 3], and [n] bool, those that stay.
@@ -43,10 +58,9 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[n
     n, edges = len(vertices), trimesh.geometry.faces_to_edges(faces)
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
     links = links.maximum(links.T)  # the rim of a mesh that is not closed
-    component = connected_component_labels(edges, n)
-    free = ~seen & np.isin(component, component[seen])
-    if not free.any():
-        return vertices, ~free
+    free = ~seen
+    if seen.all() or free.all():
+        return vertices, np.ones(n, bool)
     balance = (diags(np.asarray(links.sum(1)).ravel()) - links)[free]
     result, pull = vertices.copy(), -(balance[:, ~free] @ vertices[~free].astype(np.float64))
     for axis in range(3):

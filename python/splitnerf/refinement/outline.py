@@ -1,4 +1,5 @@
-"""Moves the vertices of an asset until its outline covers the pixels as the photos' masks say."""
+"""Moves the vertices of an asset until its outline covers the pixels as the photos say: their masks and, before a known background, their
+colours."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, distance_transform_edt, uniform_filter
 from scipy.sparse import csr_matrix, identity, kron, vstack
 from scipy.sparse.csgraph import laplacian
 from scipy.sparse.linalg import cg
@@ -14,7 +15,9 @@ from trimesh.geometry import faces_to_edges
 
 from splitnerf.data.asset import Asset
 from splitnerf.data.dataset import Dataset
+from splitnerf.data.images import linear_to_srgb, srgb_to_linear
 from splitnerf.data.lens import pixel_width
+from splitnerf.data.pixels import per_channel
 from splitnerf.ops import MeshScene
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces
 from splitnerf.refinement.pixels import PixelFilter, Pixels, pixels_of
@@ -25,6 +28,11 @@ LARGEST = 1.0  # pixels that a vertex may move in a round
 # weights of the differences of neighbours' moves and of the moves, in units of the mean curvature
 SMOOTH, ANCHOR = 0.3, 0.02
 BATCH = 4096  # pixels
+# pixels inside a mask's edge from which on a photo shows the object alone, and over which its colour is a mean
+INNER, WINDOW = 3, 5
+CLIPPED = 0.98  # sRGB from which on a background may be brighter than the photo says
+# standard errors of sRGB colours, of a mask's coverage, and of that by colours at least
+NOISE, BY_MASK, BY_COLOUR = 0.05, 0.1, 0.05
 MOST = 1 << 22  # pixels near the edges, about; each needs rays and rows of a matrix
 
 
@@ -41,13 +49,52 @@ def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
 
     pixels = pixels_of(dataset, near_edge, MOST)
     column, row = pixels.centre.astype(np.int64).T
-    return pixels, dataset.images[pixels.view, row, column, 3]
+    shares = dataset.images[pixels.view, row, column, 3]
+    for i in np.unique(pixels.view):
+        behind, here = dataset.behind(i) if dataset.whole else None, np.flatnonzero(pixels.view == i)
+        if behind is not None:
+            told = by_colours(dataset.images[i], behind, per_channel(dataset.exposures)[i])
+            shares[here] = told[row[here], column[here]]
+    return pixels, shares
+
+
+def by_colours(photo: np.ndarray, behind: np.ndarray, exposure: np.ndarray) -> np.ndarray:
+    """[H, W] the object's coverage of a photo's pixels: its mask's and, where the background is known, that by which the pixel mixes, in
+    linear light, the object's colour farther inside and the background's; each counts by the square of its error.
+
+    Args:
+        photo: [H, W, 4] sRGB at the common exposure, and the mask.
+        behind: [H, W, 4] See :meth:`splitnerf.data.dataset.Dataset.behind`.
+        exposure: [3] the photo's.
+    """
+    colour, mask = photo[..., :3], photo[..., 3]
+    core = distance_transform_edt(mask > 0.5) > INNER
+    known = (behind[..., 3] > 0) & (behind[..., :3].max(-1) < CLIPPED)
+    if not core.any():
+        return mask
+    nearest = tuple(distance_transform_edt(~core, return_distances=False, return_indices=True))
+    sums = uniform_filter(np.dstack([colour, np.ones_like(mask)]) * core[..., None], (WINDOW, WINDOW, 1))[nearest]
+    shown, inner, outer = (srgb_to_linear(x) for x in (colour, sums[..., :3] / sums[..., 3:], behind[..., :3]))
+    change, outer = 0.02 * shown + 1e-3, outer / np.float32(exposure)
+    weights = ((linear_to_srgb(shown + change) - linear_to_srgb(shown)) / change) ** 2  # errors are of sRGB
+    size = (weights * (inner - outer) ** 2).sum(-1).clip(1e-12)
+    share = ((weights * (inner - outer) * (shown - outer)).sum(-1) / size).clip(0, 1)
+    misfit = (weights * (shown - outer - share[..., None] * (inner - outer)) ** 2).sum(-1)
+    weight = np.where(known, BY_MASK**2 / np.maximum((NOISE**2 + misfit) / size, BY_COLOUR**2), 0)
+    return (mask + weight * share) / (1 + weight)
 
 
 def weld(vertices: np.ndarray) -> np.ndarray:
     """[n] the number of the place of each vertex; vertices that the charts' seams doubled share one."""
     _, number = np.unique(vertices, axis=0, return_inverse=True)
     return number.reshape(-1)
+
+
+def raised(points: np.ndarray, ground: np.ndarray | None) -> np.ndarray:
+    """Points [n, 3] with those below a plane, see `Dataset.ground`, moved up on to it."""
+    if ground is None:
+        return points
+    return points - np.minimum(points @ ground[:3] - ground[3], 0)[:, None] * ground[:3]
 
 
 def coverage(scene: MeshScene, pixels: Pixels, generator: np.random.Generator) -> np.ndarray:
@@ -111,7 +158,7 @@ def fit_outline(
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     edges = edges_of(faces)
     start = np.zeros((m, 3))
-    start[place] = asset.vertices
+    start[place] = raised(asset.vertices, dataset.ground)
     smooth = kron(SMOOTH * smoothness(faces, m) + ANCHOR * identity(m), identity(3)).tocsr()
     pixel = pixel_width(dataset.world_poses, dataset.intrinsics, asset.vertices.mean(0))
     largest, random = LARGEST * pixel, np.random.default_rng(seed)
@@ -129,5 +176,6 @@ def fit_outline(
         step, _ = cg(curvature + prior, jacobian.T @ rest - prior @ moved, rtol=1e-4, maxiter=500)
         length = np.linalg.norm(step.reshape(-1, 3), axis=1).repeat(3)
         moved += step * np.minimum(1, largest / np.maximum(length, 1e-20))
+        moved = (raised(start + moved.reshape(-1, 3), dataset.ground) - start).ravel()
     better = errors[-1] < errors[0]
     return (replace(asset, vertices=mesh.vertices[place].astype(np.float32)) if better else asset), errors

@@ -46,6 +46,7 @@ def save(training: Any) -> None:
         start=None if start is None else start.state(),
         cameras=Cameras.of(t.dataset)._asdict(),
         light_turns=t.model.turns,
+        ground=None if t.dataset.ground is None else torch.from_numpy(t.dataset.ground),
         **t.mesh.state(),
     )
     save_checkpoint(t.run / "checkpoint.pt", config=t.config, fingerprint=t.fingerprint, state=state)
@@ -221,6 +222,8 @@ def _check_content(content: dict) -> None:
     _check_cameras(content.get("cameras"))
     if (turns := content.get("light_turns")) is not None:
         check_tensor("the light's turns", turns, (len(content["cameras"]["poses"]), 3, 3), torch.float32)
+    if (ground := content.get("ground")) is not None:
+        check_tensor("ground", ground, (4,), torch.float64)
     vertices, faces = content.get("mesh_vertices"), content.get("mesh_faces")
     if vertices is not None or faces is not None:
         check_tensor("mesh_vertices", vertices, (-1, 3), torch.float32)

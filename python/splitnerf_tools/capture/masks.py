@@ -24,7 +24,7 @@ from splitnerf_tools.capture.undistorted import pinhole_of, undistort
 from splitnerf_tools.capture.world import World
 from splitnerf_tools.separation.ground import Table
 from splitnerf_tools.separation.masks import find_mask, surface_points, with_background
-from splitnerf_tools.separation.separate import find_object, table_under
+from splitnerf_tools.separation.separate import find_object, table_under, write_table
 from splitnerf_tools.separation.training import train_field
 
 STEPS = 5500  # of the field
@@ -52,6 +52,7 @@ def find_masks(
     points = surface_points(field, photos)
     table = Table(np.array([0.0, 0, 1]), float(to_box[2, 3])) if world.table else table_under(points, photos, seed)
     region = find_object(field, photos, table, points)
+    write_table(region, photos, out)
     for i in range(len(photos)):
         mask = find_mask(field, region, photos, i)
         found = (mask, None) if turntable else with_background(field, region, photos, i, mask)

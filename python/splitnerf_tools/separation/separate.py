@@ -6,9 +6,10 @@ import time
 from pathlib import Path
 
 import numpy as np
-from splitnerf.data.dataset import BEHIND, SURROUNDINGS, Dataset, spread
+from splitnerf.data.dataset import BEHIND, SURROUNDINGS, Dataset, spread, write_ground
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import write_json
+from splitnerf.data.normalisation import transform_plane
 from splitnerf.data.photos import resized_mask, separated_mask
 from splitnerf.data.reading import SEPARATION
 from splitnerf.errors import InputError, note_once
@@ -70,6 +71,7 @@ def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, 
         shares = [write_masks(field, region, split, folder) for split in (train, test) if split is not None]
         around = surroundings(field, region, points)
         write_image(folder / SURROUNDINGS, around / np.float32([usual] * 3 + [1]))
+        write_table(region, train, folder)
         write_sheet(train, folder)
         share, seconds = float(np.mean(np.concatenate(shares))), time.monotonic() - started
         write_json(folder / SEPARATION, {"table": region.table is not None, "share": share, "seconds": seconds})
@@ -122,6 +124,12 @@ def write_masks(field: RadianceField, region: Region, split: Dataset, folder: Pa
             write_image(path, picture)
         shares.append(mask.mean())
     return np.array(shares)
+
+
+def write_table(region: Region, photos: Dataset, folder: Path) -> None:
+    """Writes the plane of the object's table, if it has one, in the world of the photos."""
+    if (table := region.table) is not None:
+        write_ground(folder, transform_plane(photos.world_from_box, np.append(table.normal, table.offset)))
 
 
 def write_sheet(dataset: Dataset, folder: Path) -> None:
