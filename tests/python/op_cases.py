@@ -10,14 +10,145 @@ import torch
 import trimesh
 from mesh_shapes import OFFSET, between, cache_of, corners, grid_mesh, lattice, scene_of
 from op_checks import as_tuple, generator, lib, rand, unit
-from ray_inputs import composite_case, draw_inputs, march_inputs, packed_samples, read_inputs, surface_case
-from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs
 from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGridSpec, MeshScene, fibonacci_directions
 from splitnerf.ops.light import light_filters, zonal_factors
-from splitnerf.ops.rays import CELL_OCCUPIED
+from splitnerf.ops.rays import CELL_OCCUPIED, CELL_OPAQUE, PackedSamples
+from splitnerf.ops.shading import brdf_lut
 from splitnerf_tools.bench import subjects
 from torch.utils._pytree import tree_map
+
+# ---- rays: drawn pixels, samples along rays, their weights and colours ----
+
+OFFSETS = [0, 9, 9, 10, 24]  # one ray without samples
+
+
+def composite_inputs(device, dtype) -> tuple:
+    weights = torch.rand(OFFSETS[-1], generator=generator(1), dtype=torch.float64)
+    values = torch.randn(OFFSETS[-1], 4, generator=generator(2), dtype=torch.float64)
+    return weights.to(device, dtype), values.to(device, dtype), torch.tensor(OFFSETS, device=device)
+
+
+def march_inputs(device, dtype, n: int = 40) -> tuple:
+    """Arguments of ``march_rays``: cameras inside and outside the box, some rays parallel to an axis."""
+    draw = generator(3)
+    origins = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64))
+    origins *= 1 + 2 * torch.rand(n, 1, generator=draw, dtype=torch.float64)
+    directions = unit(torch.randn(n, 3, generator=draw, dtype=torch.float64) * 0.4 - origins)
+    directions[::8] = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
+    jitter = torch.rand(n, generator=draw, dtype=torch.float64)
+    cells = torch.randint(0, 12, (7, 7, 7), generator=draw)
+    cells = torch.where(cells == 11, CELL_OPAQUE, torch.where(cells > 5, CELL_OCCUPIED, 0)).to(torch.uint8)
+    return *(x.to(device, dtype) for x in (origins, directions, jitter)), cells.to(device), 1.5, 0.03, 64
+
+
+def draw_inputs(dtype, n: int = 300) -> tuple:
+    """Arguments of ``draw_rays``: a third of the rays near the runs of two of three photos of 8 x 11 pixels."""
+    last, shift = torch.tensor([4, 5, 40]), torch.tensor([10, 30, 200])
+    matrices = torch.randn(3, 3, 3, generator=generator(1), dtype=torch.float64)
+    none = torch.empty(0, dtype=torch.int64)
+    cameras = matrices.to(dtype), torch.arange(9.0, dtype=dtype).view(3, 3)
+    return rand(n, dtype=dtype), n // 3, last, shift, 40, none, none, 3 * 8 * 11, *cameras, 8, 11
+
+
+def read_inputs(dtype, n: int = 300) -> tuple:
+    """Arguments of ``read_pixels``: three photos of 40 pixels as words, and two runs of pixels at edges."""
+    draw = generator(8)
+    codes = torch.randint(-(2**15), 2**15, (120, 4), generator=draw).to(torch.int16)
+    index = torch.randint(120, (n,), generator=draw)
+    behind = torch.randint(256, (46, 3), generator=draw).to(torch.uint8)
+    edges = torch.tensor([3, 60]), torch.tensor([9, 100]), torch.tensor([-3, -54]), behind
+    return codes, index, index // 40, rand(3, 3, seed=9, dtype=dtype), rand(n, 3, seed=10, dtype=dtype), *edges
+
+
+def composite_case(dtype) -> tuple:
+    """Arguments of ``composite`` with the rays' opacities, of which one is less than the least."""
+    return *composite_inputs("cpu", dtype), torch.tensor([0.9, 0.5, 0.01, 0.7], dtype=dtype), 0.1
+
+
+def surface_inputs(dtype=torch.float64) -> tuple:
+    """Samples of 50 rays around a surface, some seen from behind, one with next to no gradient."""
+    _, samples, _ = packed_samples()
+    n, g = int(samples.offsets[-1]), generator(8)
+    sdf = 0.2 * torch.randn(n, generator=g, dtype=torch.float64)
+    gradient = torch.randn(n, 3, generator=g, dtype=torch.float64)
+    gradient[5] *= 1e-5
+    rays_d = unit(torch.randn(50, 3, generator=g, dtype=torch.float64))
+    s = torch.tensor(12.0, dtype=torch.float64)
+    return *(x.to(dtype) for x in (sdf, gradient, rays_d, s)), samples.offsets
+
+
+def surface_case(dtype) -> tuple:
+    """Arguments of ``surface_weights``: the distances are the first of three columns, and behind the samples there are others."""
+    sdf, gradient, rays_d, s, offsets = surface_inputs(dtype)
+    n = len(sdf)
+    outputs = torch.cat([torch.stack([sdf, sdf + 1, sdf + 2], 1), rand(70, 3, seed=11, dtype=dtype)])
+    gradient = torch.cat([gradient, rand(70, 3, seed=12, dtype=dtype)])
+    return outputs, gradient, rays_d, s, offsets, *torch.tensor([0.1, 0.4], dtype=dtype).unbind(), 1e-3, n
+
+
+def packed_samples(dtype=torch.float64, seed: int = 4) -> tuple:
+    """Weights and samples of 50 rays, the third without samples and the fifth without weight."""
+    g = generator(seed)
+    counts = torch.randint(1, 12, (50,), generator=g)
+    counts[2] = 0
+    offsets = torch.cat([torch.zeros(1, dtype=torch.int64), counts.cumsum(0)])
+    n = int(offsets[-1])
+    rays = torch.repeat_interleave(torch.arange(50), counts)
+    starts = torch.rand(n, generator=g, dtype=torch.float64).cumsum(0)
+    weights = torch.rand(n, generator=g, dtype=torch.float64) ** 4
+    weights[rays == 4] = 0
+    phase = torch.rand(50, generator=g, dtype=torch.float64)
+    samples = PackedSamples(rays, starts.to(dtype), (starts + 0.1).to(dtype), offsets)
+    return weights.to(dtype), samples, phase.to(dtype)
+
+
+def sums_inputs(n: int = 6, dtype=torch.float64, seed: int = 0) -> tuple:
+    g = generator(seed)
+
+    def rand(columns: int, lo: float, hi: float) -> torch.Tensor:
+        return lo + (hi - lo) * torch.rand(n, columns, generator=g, dtype=dtype)
+
+    normals = unit(torch.randn(n, 3, generator=g, dtype=dtype))
+    view_dirs = unit(normals + 0.7 * unit(torch.randn(n, 3, generator=g, dtype=dtype)))
+    normals[1::4] *= -1  # which face away from the viewer
+    sums = [rand(3, 0.5, 2.0), rand(3, 0.0, 0.3), rand(3, 0.1, 2.0), rand(3, 0.02, 0.5)]
+    return normals, view_dirs, rand(3, 0.05, 0.9), rand(1, 0.1, 0.9), rand(1, 0.1, 0.9), torch.stack(sums, 1)
+
+
+def mixed_sums_inputs(n: int, dtype, compensate: bool = True) -> tuple:
+    """Arguments of ``shade_sums`` with another radiance and a share."""
+    return *sums_inputs(n, dtype), brdf_lut(), compensate, rand(n, 3, seed=7, dtype=dtype), rand(n, seed=8, dtype=dtype)
+
+
+# ---- shading by the split sum ----
+
+
+def query_inputs(device, dtype, mean: bool = True, n: int = 7) -> tuple:
+    """Arguments of ``light_queries``; some normals face away from the viewer."""
+    normals, views = (unit(torch.randn(n, 3, generator=generator(i), dtype=torch.float64)) for i in (0, 1))
+    roughness = torch.rand(n, 1, generator=generator(2), dtype=torch.float64) * 0.8 + 0.1
+    return *(x.to(device, dtype) for x in (normals, views, roughness)), brdf_lut(device), mean
+
+
+def split_sum_inputs(device, dtype, mode: int = 0, compensate: bool = False, channels: int = 1, n: int = 7) -> tuple:
+    """Arguments of ``split_sum_shade`` without indirect light."""
+    normals, views, roughness, lut, _ = query_inputs(device, dtype, n=n)
+    draw = generator(3)
+    rest = [torch.rand(n, k, generator=draw, dtype=torch.float64) for k in (3, 1, 3, 3, channels, channels)]
+    albedo, metallic, specular, diffuse, occlusion_s, occlusion_d = (x.to(device, dtype) for x in rest)
+    points = normals, views, albedo, roughness, metallic
+    return *points, 3 * specular, 2 * diffuse, occlusion_s, occlusion_d, lut, mode, compensate, None, None
+
+
+def indirect_inputs(dtype, mode: int = 0, channels: int = 3, n: int = 300, stacked: bool = False) -> tuple:
+    """Arguments of ``split_sum_shade`` with indirect light; `stacked`: the light's answers in one tensor."""
+    inputs = split_sum_inputs("cpu", dtype, mode, True, channels, n)
+    points, (specular, diffuse), rest = inputs[:5], inputs[5:7], inputs[7:12]
+    light = (torch.cat([specular, diffuse]), None) if stacked else (specular, diffuse)
+    indirect = (rand(n, 3, seed=seed, dtype=dtype) for seed in (11, 12))
+    return *points, *light, *rest, *indirect
+
 
 # ---- the hash grid ----
 

@@ -1,10 +1,12 @@
 """What the tests of all operators share: devices, opcheck, and the refusal of missing gradients."""
 
+from collections import defaultdict
 from collections.abc import Callable
 
 import pytest
 import torch
 from splitnerf import ops  # noqa: F401  (loads torch.ops.splitnerf)
+from torch.overrides import TorchFunctionMode
 from torch.utils._pytree import tree_map
 
 lib = torch.ops.splitnerf
@@ -85,3 +87,27 @@ def check_error(call, *parts: str) -> None:
         call()
     for part in parts:
         assert part in str(error.value), f"{part!r} is missing in {error.value!s}"
+
+
+class Noting(TorchFunctionMode):
+    """Notes the setting at each call of a function of torch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: dict[str, set[str]] = defaultdict(set)
+
+    def __torch_function__(self, func, types, args=(), kwargs=None):
+        self.found[getattr(func, "__name__", str(func))].add(torch.backends.cuda.matmul.fp32_precision)
+        return func(*args, **(kwargs or {}))
+
+
+def precisions(function: Callable[[], object]) -> dict[str, set[str]]:
+    """The settings, "tf32" or "ieee", with which each function of torch is called; "tf32" is set outside."""
+    products = torch.backends.cuda.matmul
+    before, products.fp32_precision = products.fp32_precision, "tf32"
+    try:
+        with Noting() as mode:
+            function()
+    finally:
+        products.fp32_precision = before
+    return mode.found

@@ -112,7 +112,7 @@ def test_the_grid_of_a_gpu_waits_for_no_count(monkeypatch):
 
 
 def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch):
-    """Where each part costs the host its launches; the CPU takes parts that stay in its caches, see test_visibility_parts.py."""
+    """Where each part costs the host its launches; the CPU takes parts that stay in its caches, see test_visibility.py."""
     parts, shade = [], model.split_sum_shade
     monkeypatch.setattr(model, "SHADED_CHUNK", model.SHADED_CHUNK | {"cpu": 50})
     monkeypatch.setattr(

@@ -19,15 +19,18 @@ from op_cases import (
     cached_visibility_inputs,
     check_against_the_cpu,
     field_gradients,
+    indirect_inputs,
     lookup_inputs,
+    mixed_sums_inputs,
     pixel_inputs,
+    query_inputs,
     sdf_field_inputs,
     shared_inputs,
     sparse_inputs,
+    split_sum_inputs,
     truth,
 )
 from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
-from shading_inputs import indirect_inputs, mixed_sums_inputs, query_inputs, split_sum_inputs
 from splitnerf import _core
 from splitnerf.ops import linear_to_srgb
 from splitnerf.ops.training import quadratic_entropy

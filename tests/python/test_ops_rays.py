@@ -2,8 +2,8 @@
 
 import pytest
 import torch
+from op_cases import packed_samples, surface_inputs
 from op_checks import check_error, generator, lib
-from ray_inputs import packed_samples, surface_inputs
 from splitnerf.ops import composite, surface_weights
 from splitnerf.ops.rays import PackedSamples, PixelList, draw_rays, spread_samples
 

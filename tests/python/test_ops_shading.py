@@ -4,9 +4,8 @@ import math
 
 import pytest
 import torch
-from op_cases import shared_inputs
+from op_cases import query_inputs, shared_inputs, split_sum_inputs, sums_inputs
 from op_checks import check_error, lib, unit
-from shading_inputs import query_inputs, split_sum_inputs, sums_inputs
 from splitnerf.ops import light_queries, split_sum_shade
 from splitnerf.ops.shading import (
     SHADED,

@@ -9,8 +9,7 @@ import pytest
 import torch
 from blender_data import SIZE, look_at
 from layout_scenes import write_transforms
-from op_checks import generator
-from precision import precisions
+from op_checks import generator, precisions
 from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.ops.rays import EdgeRuns, read_pixels

@@ -10,7 +10,7 @@ from blender_data import directions_of_map
 from gltf_builder import Gltf
 from PIL import Image
 from splitnerf.cli import DONE, INTERRUPTED, main
-from splitnerf.data.environment import rotate_environment
+from splitnerf.data.environment import directions_of_texels, rotate_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, read_image, straight_srgb, write_image
 from splitnerf.errors import InputError
@@ -18,7 +18,9 @@ from splitnerf.relight import rendering
 from splitnerf.relight.background import Background, compose, environment_behind, fill
 from splitnerf.relight.cameras import HALF_FIELD, MARGIN, View, bounding_sphere, look_at, path_views, turntable
 from splitnerf.relight.output import display_frame
+from splitnerf.relight.studio import STUDIO_LIGHTS, direction, light_named, studio_light
 from splitnerf.render.path_traced import AssetRenderer
+from splitnerf_tools.view.assets import light_of
 from tiny_runs import refused
 
 CENTRE = np.array([1.0, -2.0, 0.8])  # of the ball, z up
@@ -303,3 +305,45 @@ def test_bad_input_ends_with_2_one_line_and_no_folder(tmp_path, ball, grey, caps
     words = [word.format(tmp=tmp_path, ball=ball, grey=grey) for word in words]
     assert message in refused(capsys, "relight", "--out", tmp_path / "out", *words)
     assert not (tmp_path / "out").exists()
+
+
+# ---- the lights that the program makes ----
+
+
+@pytest.mark.parametrize("name", STUDIO_LIGHTS)
+def test_a_white_matte_surface_that_faces_the_light_is_white(name):
+    """The radiance of a white Lambertian surface is irradiance / pi; the largest over all normals is 1."""
+    light = studio_light(name)
+    assert light.shape == (128, 256, 3) and light.dtype == np.float32 and light.min() >= 0
+    directions, areas = directions_of_texels(128)
+    flux = (light.mean(axis=2) * areas).ravel()
+    normals = directions_of_texels(12)[0].reshape(-1, 3)
+    radiance = [np.clip(directions.reshape(-1, 3) @ normal, 0, None) @ flux / np.pi for normal in normals]
+    assert max(radiance) == pytest.approx(1, abs=0.02)
+
+
+def test_the_sunny_lights_sun_stands_at_the_left_behind_the_camera():
+    brightest = np.unravel_index(studio_light("sunny").mean(axis=2).argmax(), (128, 256))
+    assert directions_of_texels(128)[0][brightest] @ direction(-140, 42) > np.cos(np.radians(1.5))
+
+
+def test_relight_takes_their_names(ball, tmp_path, capsys):
+    words = ["relight", str(ball), "--size", "24", "--spp", "16"]
+    lights = [word for name in STUDIO_LIGHTS for word in ("--env", name)]
+    assert main([*words, *lights, "--out", str(tmp_path / "lit")]) == DONE
+    pictures = [read_image(tmp_path / "lit" / name / "000.exr")[..., :3] for name in STUDIO_LIGHTS]
+    assert min(np.abs(a - b).mean() for i, a in enumerate(pictures) for b in pictures[:i]) > 0.01
+    assert f"or {', '.join(STUDIO_LIGHTS)}" in refused(capsys, *words, "--env", "studoi", "--out", tmp_path / "no")
+    assert not (tmp_path / "no").exists()
+    with pytest.raises(SystemExit):
+        main(["relight", "--help"])
+    assert ", ".join(STUDIO_LIGHTS) in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_file_of_that_name_goes_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_image(tmp_path / "light.exr", np.full((4, 8, 3), 7.0, np.float32))
+    (tmp_path / "light.exr").rename("studio")
+    with pytest.raises(Exception, match="use an .exr or .hdr file"):
+        light_named("studio")
+    assert np.array_equal(light_of("sunset", "x").radiance, studio_light("sunset"))

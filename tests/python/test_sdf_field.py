@@ -4,8 +4,7 @@ import math
 
 import pytest
 import torch
-from op_checks import generator, unit
-from precision import precisions
+from op_checks import generator, precisions, unit
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render.model import sharpness
