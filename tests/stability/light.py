@@ -6,7 +6,7 @@ import torch
 from splitnerf import ops
 from torch import Tensor
 
-from stability import exact_light
+from stability import exact
 from stability.cases import Draw, directions_of, unit
 from stability.entry import Entry, Rows
 
@@ -97,7 +97,7 @@ def filter_entry(name: str, shared: Rows, reason: str, **options) -> Entry:
         repair=repaired,
         bound=4e-6,
         gradient_bound=1e-5,
-        exact=exact_light.prefilter_light,
+        exact=exact.prefilter_light,
         exact_bound=1e-13,
         reason=reason,
         **options,
@@ -121,7 +121,7 @@ ENTRIES = (
         gradient_bound=2e-5,
         floor=1e-6,
         gradient_floor=1e-3,
-        exact=exact_light.light_lookup,
+        exact=exact.light_lookup,
         exact_bound=1e-13,
         reason="a few roundings, sums of 169 harmonics; radiance below a millionth of the mean light counts as that; "
         "a direction is known to a rounding of its length",

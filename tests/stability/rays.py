@@ -6,7 +6,7 @@ import torch
 from splitnerf import ops
 from torch import Tensor
 
-from stability import exact_rays
+from stability import exact
 from stability.cases import Draw, unit
 from stability.entry import Entry, Rows
 
@@ -142,7 +142,7 @@ def interpolated(rows: Rows, shared: Rows) -> Rows:
 
 def ends_entry(name: str, s: float, draw, step: float, **changes) -> Entry:
     options = {"bound": 4e-6, "gradient_bound": 8e-6, "floor": 1e-30, "gradient_floor": 1e-30 * s}
-    options["exact"] = partial(exact_rays.weights_along_z, step=step)
+    options["exact"] = partial(exact.weights_along_z, step=step)
     return Entry(
         name,
         draw=partial(draw, step=step),
@@ -161,7 +161,7 @@ def surface_entry(name: str, s: float, anneal: float) -> Entry:
         name,
         draw=draw_surface,
         call=partial(surface, anneal=anneal),
-        exact=partial(exact_rays.surface_weights, step=STEP, anneal=anneal),
+        exact=partial(exact.surface_weights, step=STEP, anneal=anneal),
         exact_bound=1e-12,
         smooth=("sdf", "gradient"),
         smooth_shared=("s",),

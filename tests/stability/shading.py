@@ -6,7 +6,7 @@ from splitnerf.ops._library import lib
 from splitnerf.ops.shading import SHADED
 from torch import Tensor
 
-from stability import exact_shading
+from stability import exact
 from stability.cases import Draw, drawn_directions, unit
 from stability.entry import Entry, Rows
 
@@ -160,7 +160,7 @@ ENTRIES = (
         repair=repaired,
         bound=2e-6,
         gradient_bound=4e-6,
-        exact=exact_shading.light_queries,
+        exact=exact.light_queries,
         exact_bound=1e-14,
         gradient_floor=1.0,
         reason=BY_CONDITION + "; gradients of unit vectors count as at least 1, as theirs may vanish",
@@ -174,7 +174,7 @@ ENTRIES = (
         bound=2e-6,
         smooth=SHADED,
         gradient_bound=4e-6,
-        exact=exact_shading.split_sum_shade,
+        exact=exact.split_sum_shade,
         exact_bound=1e-14,
         reason=BY_CONDITION,
     ),
@@ -187,7 +187,7 @@ ENTRIES = (
         bound=2e-6,
         smooth=(*SHADED[:5], *ops.shading.LightSums._fields, "other"),
         gradient_bound=4e-6,
-        exact=exact_shading.shade_sums,
+        exact=exact.shade_sums,
         exact_bound=1e-14,
         reason=BY_CONDITION,
     ),
@@ -199,7 +199,7 @@ ENTRIES = (
         bound=4e-6,
         smooth=("normals", "roughness", "radiance"),
         gradient_bound=8e-6,
-        exact=exact_shading.light_sums,
+        exact=exact.light_sums,
         exact_bound=1e-14,
         floor=1e-10,
         size=SAMPLES,
@@ -224,7 +224,7 @@ ENTRIES = (
         "linear_to_srgb",
         draw=draw_linear,
         smooth=("linear",),
-        exact=exact_shading.linear_to_srgb,
+        exact=exact.linear_to_srgb,
         exact_bound=1e-14,
         call=lambda rows, shared: {"srgb": ops.linear_to_srgb(rows["linear"])},
         bound=1e-5,
@@ -235,7 +235,7 @@ ENTRIES = (
         "srgb_to_linear",
         draw=draw_srgb,
         conditioned=False,
-        exact=exact_shading.srgb_to_linear,
+        exact=exact.srgb_to_linear,
         exact_bound=1e-14,
         repair=lambda rows: {"srgb": rows["srgb"].clamp(0, 1e15)},
         call=lambda rows, shared: {"linear": ops.shading.srgb_to_linear(rows["srgb"])},
