@@ -11,8 +11,7 @@ from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import linear_to_srgb, write_image
 from splitnerf.data.reading import Reading
-from splitnerf_tools.inspection.checks import Inspection, inspect
-from splitnerf_tools.inspection.directions import find_upward, largest_gap
+from splitnerf_tools.inspection.checks import Inspection, find_upward, inspect, largest_gap
 from splitnerf_tools.inspection.reduced_views import views_of
 from tiny_runs import refused
 

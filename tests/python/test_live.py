@@ -25,9 +25,8 @@ from splitnerf.training.observer import NOBODY, Event, Request
 from splitnerf_tools.view import live as live_module
 from splitnerf_tools.view.assets import ViewedAssets
 from splitnerf_tools.view.events import EventStream
-from splitnerf_tools.view.live import Live
+from splitnerf_tools.view.live import LINEAR, Live, training_asset
 from splitnerf_tools.view.server import ViewServer
-from splitnerf_tools.view.training_asset import LINEAR, training_asset
 from splitnerf_tools.view.training_page import training_page
 from test_train import flat, same
 from tiny_runs import lines_of, tiny

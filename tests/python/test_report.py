@@ -17,7 +17,7 @@ from PIL import Image
 from splitnerf.cli.common import print_scores
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb
-from splitnerf.evaluate.grades import graded
+from splitnerf.evaluate.score_table import graded
 from splitnerf.export.writers import write_glb
 from splitnerf.relight.cameras import MARGIN
 from splitnerf.relight.studio import STUDIO_LIGHTS, studio_light

@@ -24,7 +24,7 @@ from splitnerf.training.start import (
     fit_to,
     surface_depths,
 )
-from splitnerf_tools.synth.orbits import spiral
+from splitnerf_tools.synth.rendering import spiral
 from tiny_runs import tiny, train_scene
 
 SIZE, VIEWS, BOX, CELLS = 80, 40, 1.5, 48

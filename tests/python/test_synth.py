@@ -14,8 +14,7 @@ from splitnerf.evaluate.scoring import FIRST_SEED, asset_mesh
 from splitnerf.relight.cameras import bounding_sphere
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.commands import synth as synth_command
-from splitnerf_tools.synth.orbits import orbit, spiral
-from splitnerf_tools.synth.rendering import SynthSettings, normalised, render_views, synthesise
+from splitnerf_tools.synth.rendering import SynthSettings, normalised, orbit, render_views, spiral, synthesise
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 from tiny_runs import command

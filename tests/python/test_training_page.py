@@ -20,9 +20,8 @@ from splitnerf.training.loop import Training
 from splitnerf.training.observer import Event, together
 from splitnerf_tools.view import live as live_module
 from splitnerf_tools.view.assets import ViewedAssets
-from splitnerf_tools.view.live import Live
+from splitnerf_tools.view.live import Live, training_asset
 from splitnerf_tools.view.server import Handler, ViewServer
-from splitnerf_tools.view.training_asset import training_asset
 from tiny_runs import tiny
 from viewer_server import triangle
 

@@ -13,7 +13,7 @@ from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.model import SceneModel
 from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
 from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step
-from splitnerf_tools.synth.orbits import orbit
+from splitnerf_tools.synth.rendering import orbit
 from tiny_runs import tiny
 
 RADIUS, SIZE = 0.6, 24

@@ -223,7 +223,7 @@ def print_refinement(summary: dict | None) -> None:
 
 def print_scores(evaluation: dict) -> None:
     """A line for each score, after its free scale if it has one, with what it means in a word."""
-    from splitnerf.evaluate.grades import graded
+    from splitnerf.evaluate.score_table import graded
 
     words = {row["place"][0]: f" ({row['word']})" for row in graded(evaluation)}
     for name, key in (("novel views", "novel_view"), ("relit views", "relight"), ("albedo", "albedo")):

@@ -14,7 +14,7 @@ import trimesh
 from splitnerf.data.environment import directions_of_texels
 from splitnerf.relight.studio import direction, smoothstep, soft_box
 
-from splitnerf_tools.synth.orbits import orbit, spiral
+from splitnerf_tools.synth.rendering import orbit, spiral
 from splitnerf_tools.synth.writer import SceneWriter
 
 CAMERA_DISTANCE = 3.0

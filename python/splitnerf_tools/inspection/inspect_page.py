@@ -9,8 +9,7 @@ from markupsafe import Markup
 from scipy import ndimage
 from splitnerf.data.dataset import spread
 
-from splitnerf_tools.inspection.checks import Inspection
-from splitnerf_tools.inspection.directions import horizontal_axes
+from splitnerf_tools.inspection.checks import Inspection, horizontal_axes
 from splitnerf_tools.report.drawings import line_chart, plan
 from splitnerf_tools.report.embedding import photo_uri, write_html
 

@@ -59,7 +59,7 @@ def write_report(
         light: [h, w, 3] linear radiance that is delivered, or None.
         asset: The GLB that is delivered; None, or one that is not there, for a page without a 3D view.
         albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
-        grades: Scores in words, see :func:`splitnerf.evaluate.grades.graded`.
+        grades: Scores in words, see :func:`splitnerf.evaluate.score_table.graded`.
         relit: The asset under other lights: their names, and pictures [h, w, 3], sRGB in [0, 1].
 
     Raises:

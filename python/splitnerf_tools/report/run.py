@@ -13,7 +13,7 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, over_background
 from splitnerf.data.truth import load_scene_truth
-from splitnerf.evaluate.grades import graded
+from splitnerf.evaluate.score_table import graded
 from splitnerf.evaluate.scoring import Evaluated, asset_predictions
 from splitnerf.fields.light import panorama_directions
 from splitnerf.ops import fibonacci_directions, prefilter_light

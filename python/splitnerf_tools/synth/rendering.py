@@ -1,8 +1,10 @@
-"""From an asset and environment maps to a dataset with truth."""
+"""From an asset and environment maps to a dataset with truth: its cameras, its photos, and the asset in its world."""
 
 from __future__ import annotations
 
 import itertools
+import json
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,15 +13,14 @@ import numpy as np
 from splitnerf.data.asset import Asset
 from splitnerf.data.environment import read_environment, resize_environment, turn_environment
 from splitnerf.data.gltf import read_asset
+from splitnerf.data.gltf.geometry import scene_roots
 from splitnerf.data.truth import PREFIX
 from splitnerf.errors import InputError, note
-from splitnerf.files import LOCK, locked
-from splitnerf.relight.cameras import bounding_sphere
+from splitnerf.files import LOCK, atomic_path, locked
+from splitnerf.relight.cameras import bounding_sphere, look_at
 from splitnerf.render.path_traced import LARGEST_PICTURE, MOST_SPP, MOST_VIEWS, AssetRenderer
 from tqdm import tqdm
 
-from splitnerf_tools.synth.orbits import orbit, spiral
-from splitnerf_tools.synth.placement import write_placed_glb
 from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
 
 CAMERA_ANGLE_X = 0.6911112070083618  # radians, as in the NeRF Blender scenes
@@ -165,3 +166,80 @@ def resized(environment: np.ndarray) -> np.ndarray:
     """The map at no more than 512 x 256 pixels."""
     height, width = (min(a, b) for a, b in zip(environment.shape, MAP_SIZE))
     return resize_environment(environment, height, width)
+
+
+# ---- the asset in the world of the data ----
+
+HEADER = 20  # of the file and of its first chunk, which is the JSON
+
+
+def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: float) -> bool:
+    """Writes the asset with a node above its scene that applies (x - centre) scale, `centre` [3] in the source's world, z up, and
+    without emission; whether the file was written, as a .gltf is not copied, whose data are in other files.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    data = source.read_bytes()
+    if data[:4] != b"glTF":
+        return False
+    length = struct.unpack_from("<I", data, 12)[0]
+    document, rest = json.loads(data[HEADER : HEADER + length]), data[HEADER + length :]
+    stored = [item for kind in ("buffers", "images") for item in document.get(kind, [])]
+    if any(not item.get("uri", "data:").startswith("data:") for item in stored):
+        return False
+    x, y, z = (float(-value * scale) for value in centre)
+    root = {"name": "unit sphere", "children": scene_roots(document), "scale": [scale] * 3, "translation": [x, z, -y]}
+    document["scenes"], document["scene"] = [{"nodes": [len(document["nodes"])]}], 0
+    document["nodes"].append(root)
+    for material in document.get("materials", []):
+        material.pop("emissiveFactor", None)
+        material.pop("emissiveTexture", None)
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    with atomic_path(target) as temporary, open(temporary, "wb") as file:
+        file.write(struct.pack("<4sII", b"glTF", 2, HEADER + len(text) + len(rest)))
+        file.write(struct.pack("<I4s", len(text), b"JSON") + text + rest)
+    return True
+
+
+# ---- cameras on a sphere around the origin, which they look at ----
+
+
+def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float = 0.0) -> np.ndarray:
+    """Cameras spread evenly over a band of the sphere, on a golden spiral.
+
+    Args:
+        n: Number of cameras.
+        distance: From the origin.
+        elevations: Lowest and highest, in degrees from the horizon.
+        turn: Azimuth of the first, in degrees.
+
+    Returns:
+        [n, 4, 4] float64 camera-to-world, OpenGL axes.
+    """
+    golden_turn = 360 / ((1 + np.sqrt(5)) / 2)
+    heights = np.linspace(*np.sin(np.radians(elevations)), n)
+    return _poses(turn + np.arange(n) * golden_turn, np.degrees(np.arcsin(heights)), distance)
+
+
+def orbit(n: int, distance: float, elevation: float, swing: float = 0.0, start: float = 0.5) -> np.ndarray:
+    """Cameras on one turn about the vertical.
+
+    Args:
+        n: Number of cameras.
+        distance: From the origin.
+        elevation: Mean elevation in degrees.
+        swing: Amplitude in degrees with which the elevation goes up and down, twice a turn.
+        start: Azimuth of the first, in steps of 360 / n degrees.
+
+    Returns:
+        [n, 4, 4] float64 camera-to-world, OpenGL axes.
+    """
+    share = np.arange(n) / n
+    return _poses(360 * (share + start / n), elevation + swing * np.sin(4 * np.pi * share), distance)
+
+
+def _poses(azimuths: np.ndarray, elevations: np.ndarray, distance: float) -> np.ndarray:
+    angles = np.radians([azimuths, elevations]).T
+    return np.array([look_at(np.zeros(3), *pair, distance) for pair in angles]).reshape(-1, 4, 4)
