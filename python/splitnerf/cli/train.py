@@ -132,8 +132,6 @@ def settings_of(args: argparse.Namespace) -> dict[str, object]:
     """The settings that the options give, by name."""
     from splitnerf.config import parse_setting
 
-    if args.max_minutes is not None and args.max_minutes <= 0:
-        raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
     settings = dict(parse_setting(text) for text in args.settings)
     settings |= budget(args.steps, args.max_minutes) | reading_options(args)
     if args.seed is not None:
@@ -203,10 +201,13 @@ def device_for(wanted: str, deterministic: bool) -> str:
     return device
 
 
-def budget(steps: int | None, minutes: float | None) -> dict[str, object]:
-    """The settings that end a run: steps, minutes, or both."""
+def budget(steps: int | None, minutes: float | None, option: str = "--max-minutes") -> dict[str, object]:
+    """The settings that end a run: steps, minutes, or both. Raises InputError where the minutes, of this option, are not
+    positive."""
     from splitnerf.config.settings import UNLIMITED
 
+    if minutes is not None and not minutes > 0:
+        raise InputError(f"{option} must be positive, got {minutes}")
     if minutes is None:
         return {} if steps is None else {"run.steps": steps, "run.max_minutes": 0.0}
     return {"run.steps": UNLIMITED if steps is None else steps, "run.max_minutes": minutes}

@@ -88,7 +88,9 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.
     closed = is_closed(faces)
     for share, aggressiveness in product(SHARES, AGGRESSIVENESS):
         light = fast_simplification.simplify(vertices, faces, target_count=int(share * n_faces), agg=aggressiveness)
-        result = split_pinches(*_compact(light[0].astype(np.float32), _without_fins(light[1])))
+        _, group, count = np.unique(np.sort(light[1], axis=1), axis=0, return_inverse=True, return_counts=True)
+        single = light[1][count[group.reshape(-1)] == 1]  # two faces of the same vertices are a sheet without volume
+        result = split_pinches(*_compact(light[0].astype(np.float32), single))
         if not closed or is_closed(result[1]):
             break
     return result
@@ -117,12 +119,6 @@ def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
         connected_component_labels(links, vertex.size), return_index=True, return_inverse=True
     )
     return vertices[vertex[first]], renumbered.reshape(-1, 3).astype(np.int32)
-
-
-def _without_fins(faces: np.ndarray) -> np.ndarray:
-    """The faces without pairs that share all three vertices; such a pair is a sheet without volume."""
-    _, group, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return faces[count[group.reshape(-1)] == 1]
 
 
 def _compact(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

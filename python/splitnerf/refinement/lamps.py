@@ -243,10 +243,6 @@ class Contrasts:
         change = np.clip(change[0::2] - change[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
         return robust(self._contrast[:, None] - change)
 
-    def left_by(self, lamp: CompactLamp) -> np.ndarray:
-        """[k] of what one lamp leaves."""
-        return self.costs_left(self.lamps(np.array([lamp.direction]), lamp.radius), lamp.factor)[:, 0]
-
 
 def robust(contrast: np.ndarray) -> np.ndarray:
     """The cost of contrasts, which are the texture's where they are large."""
@@ -315,7 +311,8 @@ def lamp_near(lobe: Lobe, contrasts: Contrasts) -> CompactLamp | None:
     rough = best_lamp(contrasts, disc(lobe.direction, FARTHEST, N_TRIED), RADII, FACTORS[::COARSE])
     best = best_lamp(contrasts, disc(np.array(rough.direction), FINER, N_FINER), (rough.radius,), FACTORS)
     at_rim = best.radius == max(RADII) or degrees_from(lobe.direction, np.array(best.direction)) > FARTHEST - FINER
-    gain = contrasts.costs - contrasts.left_by(best)
+    shining = contrasts.lamps(np.array([best.direction]), best.radius)
+    gain = contrasts.costs - contrasts.costs_left(shining, best.factor)[:, 0]
     clear = gain.mean() > MIN_SIGMAS * gain.std() / np.sqrt(len(gain))
     return best if clear and not at_rim and best.factor >= LEAST_FACTOR else None
 

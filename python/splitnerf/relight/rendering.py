@@ -97,7 +97,11 @@ def relight(
     lights = [rotate_environment(light_named(path), settings.rotate_env) for path in maps]
     asset = asset_of(source)
     views = views_of(asset)
-    _check_animation(views, settings)
+    sizes = {(view.width, view.height) for view in views}
+    if (settings.gif or settings.mp4) and len(sizes) > 1:
+        raise InputError("--gif and --mp4: the frames differ in size; give --size")
+    if settings.mp4 and min(min(size) for size in sizes) < 2:
+        raise InputError("--mp4 needs frames of at least 2x2 pixels; give a larger --size")
     names = file_names(len(views), gif=settings.gif, mp4=settings.mp4)
     with ExitStack() as stack:
         for folder in folders:
@@ -152,14 +156,6 @@ def render_frames(
             write_gif(folder / GIF, frames, settings.fps)
         if settings.mp4:
             write_mp4(folder / MP4, frames, settings.fps)
-
-
-def _check_animation(views: list[View], settings: Settings) -> None:
-    sizes = {(view.width, view.height) for view in views}
-    if (settings.gif or settings.mp4) and len(sizes) > 1:
-        raise InputError("--gif and --mp4: the frames differ in size; give --size")
-    if settings.mp4 and min(min(size) for size in sizes) < 2:
-        raise InputError("--mp4 needs frames of at least 2x2 pixels; give a larger --size")
 
 
 def lowest(asset: Asset) -> float:

@@ -56,17 +56,13 @@ def differences(scores: Sequence[Score], scene: str) -> list[Difference]:
     found = []
     for name in dict.fromkeys(s.row for s in here if s.row != FULL):
         runs = [s for s in here if s.row == name and (s.reference, s.seed) in by_run]
-        gaps = [_gap(s, by_run[s.reference, s.seed]) for s in runs]
+        pairs = [(s.values, by_run[s.reference, s.seed].values) for s in runs]
+        keys = ["novel_view" if None in (a["relight"], b["relight"]) else "relight" for a, b in pairs]
+        gaps = [a[key] - b[key] for key, (a, b) in zip(keys, pairs)]
         if gaps:
             error = float(np.std(gaps, ddof=1) / np.sqrt(len(gaps))) if len(gaps) > 1 else None
             found.append(Difference(name, float(np.mean(gaps)), error))
     return found
-
-
-def _gap(score: Score, reference: Score) -> float:
-    """By how many dB one run is better than another, over relit views or, where one has none, novel views."""
-    key = "novel_view" if None in (score.values["relight"], reference.values["relight"]) else "relight"
-    return score.values[key] - reference.values[key]
 
 
 def csv_table(scores: Sequence[Score]) -> str:

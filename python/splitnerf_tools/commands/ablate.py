@@ -53,10 +53,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.seeds != 1 and args.seeds < 3:
         raise InputError(f"--seeds must be 1, or 3 and more, as two do not show their spread; got {args.seeds}")
-    if args.minutes is not None and args.minutes <= 0:
-        raise InputError(f"--minutes must be positive, got {args.minutes}")
     minutes = 6.0 if args.minutes is None and args.steps is None else args.minutes
-    settings = dict(parse_setting(text) for text in args.settings) | budget(args.steps, minutes)
+    settings = dict(parse_setting(text) for text in args.settings) | budget(args.steps, minutes, "--minutes")
     names = None if args.rows is None else [name.strip() for name in args.rows.split(";") if name.strip()]
     rows = make_rows(preset(args.preset).replace({"run.cuda_graphs": False} | settings), names)  # not all rows can
     for name in names or []:

@@ -40,8 +40,6 @@ def run(args: argparse.Namespace) -> int:
 
     from splitnerf_tools.demo.scene import write_demo_dataset
 
-    if not args.max_minutes > 0:
-        raise InputError(f"--max-minutes must be positive, got {args.max_minutes}")
     settings = {"run.seed": args.seed, "refinement.enabled": not args.no_refine, **budget(None, args.max_minutes)}
     config, data = preset("cpu").replace(settings), args.out / "data"
     with locked(args.out):

@@ -61,10 +61,11 @@ def failures(device: str, names: Iterable[str] | None = None) -> list[Failure]:
     for name in operators(device) if names is None else names:
         try:
             found, result = dict(results(name, device)), ""
+            tolerance = TOLERANCE_OF_RAYS if name in CPU_ALONE else TOLERANCE
             wrong = [
                 (result, f"found {found[result][0]:.6g}, expected {known[0]:.6g}")
                 for result, known in answers()[name].items()
-                if is_off(name, found[result], known)
+                if any(not abs(a - b) <= tolerance * known[1] for a, b in zip(found[result], known))
             ]
         except Exception as error:  # whatever it is, it is reported, and the other operators are asked
             wrong = [("", f"raised {type(error).__name__}: {' '.join(str(error).split())[:200]}")]
@@ -72,11 +73,6 @@ def failures(device: str, names: Iterable[str] | None = None) -> list[Failure]:
             result, said = wrong[0]
             failed.append(Failure(name, device, said, f"a weighted sum over its {result}" if result else "no answer"))
     return failed
-
-
-def is_off(operator: str, found: list[float], known: list[float]) -> bool:
-    tolerance = (TOLERANCE_OF_RAYS if operator in CPU_ALONE else TOLERANCE) * known[1]
-    return any(not abs(a - b) <= tolerance for a, b in zip(found, known))
 
 
 def results(operator: str, device: str, dtype: torch.dtype = torch.float32) -> Iterator[tuple[str, list[float]]]:
