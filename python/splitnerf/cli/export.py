@@ -25,18 +25,17 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf export runs/data --pivot foot --height 0.25 --out vase",
         ),
     )
-    parser.add_argument("run", type=Path, metavar="RUN")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained if it was refined)"
-    )
+    add = parser.add_argument
+    add("run", type=Path, metavar="RUN")
+    add("--out", type=Path, metavar="DIR", help="where to write (default: RUN, or RUN/trained if it was refined)")
     for option, kind, default, name, text in (
         ("--faces", int, None, "N", "faces of the textured mesh, 0 keeps all (default: as in training)"),
         ("--texture-size", int, None, "N", "texels along an edge (default: as in training)"),
         ("--resolution", int, None, "N", "nodes along an edge of the grid that is meshed (default: as in training)"),
         ("--formats", str, "glb,ply", "LIST", "of glb, ply, obj, usdz (default: glb,ply); usdz needs the extra 'usd'"),
     ):
-        parser.add_argument(option, type=kind, default=default, metavar=name, help=text)
-    parser.add_argument(
+        add(option, type=kind, default=default, metavar=name, help=text)
+    add(
         "--pivot",
         choices=["data", "foot"],
         default="data",
@@ -45,7 +44,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--scale", type=float, default=1.0, metavar="S", help="units of the files for one of the data's")
     size.add_argument("--height", type=float, metavar="H", help="how high the asset is in the files, in their units")
-    parser.add_argument("--overwrite", action="store_true", help="replace an earlier export in --out")
+    add("--overwrite", action="store_true", help="replace an earlier export in --out")
     parser.set_defaults(execute=run)
 
 

@@ -19,30 +19,27 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "the same time, and writes ablation.csv, ablation.md and the runs into OUT. Repeat the command to continue.",
         epilog=examples("splitnerf ablate data --minutes 6", "splitnerf ablate --list"),
     )
-    parser.add_argument("data", type=Path, nargs="*", metavar="DATA")
-    parser.add_argument("--out", type=Path, default=Path("runs/ablation"), metavar="OUT", help="default: runs/ablation")
-    parser.add_argument("--minutes", type=float, metavar="M", help="training time of each run (default: 6, or --steps)")
-    parser.add_argument("--steps", type=int, metavar="N", help="optimiser steps of each run")
-    parser.add_argument("--rows", metavar="LIST", help="names of rows, by semicolons (default: all; --list names them)")
-    parser.add_argument("--list", action="store_true", help="print the rows and what they set, and train nothing")
-    parser.add_argument(
+    add = parser.add_argument
+    add("data", type=Path, nargs="*", metavar="DATA")
+    add("--out", type=Path, default=Path("runs/ablation"), metavar="OUT", help="default: runs/ablation")
+    add("--minutes", type=float, metavar="M", help="training time of each run (default: 6, or --steps)")
+    add("--steps", type=int, metavar="N", help="optimiser steps of each run")
+    add("--rows", metavar="LIST", help="names of rows, by semicolons (default: all; --list names them)")
+    add("--list", action="store_true", help="print the rows and what they set, and train nothing")
+    add(
         "--seeds",
         type=int,
         default=1,
         metavar="N",
         help="runs of rows within 0.3 dB of what they are compared with, 3 or more (default: 1)",
     )
-    parser.add_argument("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
-    parser.add_argument("--views", type=int, metavar="N", help="test views to score (default: all)")
-    parser.add_argument("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
-    parser.add_argument(
-        "--lights", choices=["low", "high"], help="a published relighting protocol, 20 views; see evaluate"
-    )
-    parser.add_argument("--maps", type=Path, metavar="FOLDER", help="folder of maps that DATA has relit images of")
-    parser.add_argument("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows"
-    )
+    add("--downscale", type=int, default=1, metavar="N", help="average images down by N (default: 1)")
+    add("--views", type=int, metavar="N", help="test views to score (default: all)")
+    add("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
+    add("--lights", choices=["low", "high"], help="a published relighting protocol, 20 views; see evaluate")
+    add("--maps", type=Path, metavar="FOLDER", help="folder of maps that DATA has relit images of")
+    add("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows")
     parser.set_defaults(execute=run)
 
 

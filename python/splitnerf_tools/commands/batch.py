@@ -39,23 +39,14 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf batch scenes/* --out runs/all --max-minutes 30 --address 10.0.0.1:6379",
         ),
     )
-    parser.add_argument("scenes", type=Path, nargs="+", metavar="SCENES", help="folders of photographs with cameras")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table"
-    )
-    parser.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster to use (default: Ray is started here)")
-    parser.add_argument(
-        "--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes"
-    )
-    parser.add_argument(
-        "--gpus-per-scene", type=float, metavar="N", help="default: 0.25 where there are GPUs; preset paper: 1"
-    )
-    parser.add_argument(
-        "--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it"
-    )
-    parser.add_argument(
-        "--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)"
-    )
+    add = parser.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENES", help="folders of photographs with cameras")
+    add("--out", type=Path, required=True, metavar="DIR", help="the folder of the runs and of the table")
+    add("--address", metavar="HOST:PORT", help="the Ray cluster to use (default: Ray is started here)")
+    add("--cores-per-scene", type=float, metavar="N", help="default: all cores, divided among the scenes")
+    add("--gpus-per-scene", type=float, metavar="N", help="default: 0.25 where there are GPUs; preset paper: 1")
+    add("--memory-per-scene", type=float, metavar="GB", help="default: 4; photos may take all but 2.15 of it")
+    add("--retries", type=int, default=3, metavar="N", help="of a scene whose process was killed (default: 3)")
     parser.set_defaults(execute=run)
 
 

@@ -19,15 +19,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "trains on it and prints the errors. Nothing is downloaded.",
         epilog=examples("splitnerf demo", "splitnerf demo --max-minutes 1 --out runs/short --overwrite"),
     )
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)"
-    )
-    parser.add_argument(
-        "--max-minutes", type=float, default=4.0, metavar="M", help="time of training and refinement (default: 4)"
-    )
-    parser.add_argument("--no-refine", action="store_true", help="no refinement: training gets all minutes")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--overwrite", action="store_true", help="replace the run in --out")
+    add = parser.add_argument
+    add("--out", type=Path, default=Path("runs/demo"), metavar="RUN", help="the run's folder (default: runs/demo)")
+    add("--max-minutes", type=float, default=4.0, metavar="M", help="time of training and refinement (default: 4)")
+    add("--no-refine", action="store_true", help="no refinement: training gets all minutes")
+    add("--seed", type=int, default=0)
+    add("--overwrite", action="store_true", help="replace the run in --out")
     parser.set_defaults(execute=run)
 
 

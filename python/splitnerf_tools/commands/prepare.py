@@ -38,18 +38,19 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
             "splitnerf prepare photos --masks masks --max-size 1600 --out data",
         ),
     )
-    parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
-    parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write")
-    parser.add_argument("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
-    parser.add_argument("--max-size", type=int, default=0, metavar="N", help="longest edge in pixels (0: the photos')")
-    parser.add_argument("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
-    parser.add_argument(
+    add = parser.add_argument
+    add("photos", type=Path, metavar="PHOTOS", help="folder of photos, or a video file")
+    add("--out", type=Path, required=True, metavar="DATA", help="folder to write")
+    add("--masks", type=Path, metavar="DIR", help="masks of the photos, NAME.png, white on the object")
+    add("--max-size", type=int, default=0, metavar="N", help="longest edge in pixels (0: the photos')")
+    add("--frames", type=int, default=100, metavar="N", help="frames taken of a video (default: 100)")
+    add(
         "--turntable",
         action="store_true",
         help="the object turned before a camera on a stand, which may be moved up and down: features are taken of what "
         "moves, and each photo gets the rotation of its light",
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
+    add("--seed", type=int, default=0, help="seed of all random choices (default: 0)")
     parser.set_defaults(execute=run)
 
 

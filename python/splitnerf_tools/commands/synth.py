@@ -34,31 +34,28 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="NAME",
         help=f"a built-in shape, hollow, pierced or touching: {', '.join(SHAPES)}",
     )
-    parser.add_argument("--material", choices=MATERIALS, help="of the shape, under a painted pattern (default: matte)")
-    parser.add_argument(
-        "--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr"
-    )
-    parser.add_argument(
-        "--relight", type=Path, nargs="+", default=[], metavar="MAP", help="maps of the relit test views"
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="DATA", help="folder to write, absent or empty")
-    parser.add_argument("--size", type=int, default=200, metavar="N", help="width and height in pixels (default: 200)")
-    parser.add_argument("--train", type=int, default=100, metavar="N", help="number of train views (default: 100)")
-    parser.add_argument("--test", type=int, default=20, metavar="N", help="number of test views (default: 20)")
-    parser.add_argument("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
-    parser.add_argument(
+    add = parser.add_argument
+    add("--material", choices=MATERIALS, help="of the shape, under a painted pattern (default: matte)")
+    add("--light", type=Path, required=True, metavar="MAP", help="environment map of the photos, .hdr or .exr")
+    add("--relight", type=Path, nargs="+", default=[], metavar="MAP", help="maps of the relit test views")
+    add("--out", type=Path, required=True, metavar="DATA", help="folder to write, absent or empty")
+    add("--size", type=int, default=200, metavar="N", help="width and height in pixels (default: 200)")
+    add("--train", type=int, default=100, metavar="N", help="number of train views (default: 100)")
+    add("--test", type=int, default=20, metavar="N", help="number of test views (default: 20)")
+    add("--spp", type=int, default=256, metavar="N", help="paths a pixel (default: 256)")
+    add(
         "--layout",
         choices=LAYOUTS,
         metavar="SET",
         default="blender",
         help=f"whose files the data look like (default: blender): {', '.join(LAYOUTS)}",
     )
-    parser.add_argument(
+    add(
         "--turntable",
         action="store_true",
         help="the object turns before the camera, so that the light turns with the camera",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
+    add("--seed", type=int, default=0, help="of the noise and the first camera (default: 0)")
     parser.set_defaults(execute=run)
 
 
