@@ -99,6 +99,7 @@ TRANSFORMS = {
     "zero frames": (meta(lambda m: m["frames"].clear()), "transforms_train.json: has no frames"),
     "no angle": (meta(lambda m: m.pop("camera_angle_x")), "transforms_train.json: missing key 'camera_angle_x'"),
     "bad angle": (meta(lambda m: m.update(camera_angle_x="1")), "must be a positive num.* below pi, got the text '1'"),
+    "true angle": (meta(lambda m: m.update(camera_angle_x=True)), "must be a positive num.* below pi, got True"),
     "angle of degrees": (meta(lambda m: m.update(camera_angle_x=40)), "_x' must be .* radians below pi, got 40"),
     "tiny width": (meta(lambda m: m.update(w=1e-300, fl_x=20)), "'w' must be a positive number"),
     "no file path": (meta(lambda m: m["frames"][1].pop("file_path")), "missing key 'file_path' in frame 1"),

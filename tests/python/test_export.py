@@ -17,17 +17,19 @@ from PIL import Image
 from splitnerf.cli import DONE, main
 from splitnerf.config import Config
 from splitnerf.data.asset import Asset, Material, vertex_tangents
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.dataset import load_dataset, write_ground
+from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, read_image, read_radiance
 from splitnerf.data.json_files import read_json, write_json
 from splitnerf.export.scene import write_assets, write_environment, write_mesh_ply
+from splitnerf.export.simplify import is_closed
 from splitnerf.export.writers import write_glb, write_obj, write_usdz
 from splitnerf.fields import Light
 from splitnerf.render.model import SceneModel
 from splitnerf.render.seen import Cameras
 from splitnerf.training.checkpoint import load_checkpoint
 from splitnerf.training.loop import Training
-from tiny_runs import refused
+from tiny_runs import refused, train
 
 
 @pytest.fixture
@@ -221,6 +223,20 @@ def test_export_writes_the_asset_in_the_data_s_world(tmp_path, run, capsys):
     assert np.ptp(arrays["POSITION"], axis=0) == pytest.approx(0.7, rel=0.2)
     outward = ((arrays["POSITION"] - centre) * arrays["NORMAL"]).sum(axis=1)
     assert (outward > 0).all() and "TANGENT" in arrays and len(document["images"]) == 3
+
+
+def test_an_asset_ends_at_the_ground(tmp_path, data):
+    """The sphere stands in it: what training and a later export write is closed, and has nothing below it."""
+    data = shutil.copytree(data, tmp_path / "data")
+    write_ground(data, np.array([0, 0.6, 0.8, -0.2]))
+    assert train(data, tmp_path / "run", "--steps", "2") == DONE
+    assert main(["export", str(tmp_path / "run"), "--out", str(tmp_path / "again"), "--formats", "glb"]) == DONE
+    for folder in ("run", "again"):
+        asset = read_asset(tmp_path / folder / "mesh.glb")
+        heights = asset.vertices @ [0, 0.6, 0.8] + 0.2
+        assert abs(heights.min()) < 1e-3 and heights.max() > 0.5
+        _, place = np.unique(asset.vertices, axis=0, return_inverse=True)
+        assert is_closed(place.reshape(-1)[asset.triangles])
 
 
 def test_export_stands_the_asset_on_its_foot_at_its_height(tmp_path, run, capsys):

@@ -128,6 +128,12 @@ def test_an_image_of_luminance_and_differences_of_colours_is_refused(tmp_path, c
     assert sink.open(str(tmp_path / "x.exr"), spec) and sink.write_deep_image(samples) and sink.close()
     with pytest.raises(InputError, match="x.exr: holds several samples a pixel .deep.; flatten it"):
         read_image(tmp_path / "x.exr")
+    numbers, sink = oiio.ImageSpec(2, 2, 3, "uint"), oiio.ImageOutput.create("x.exr")
+    assert (
+        sink.open(str(tmp_path / "x.exr"), numbers) and sink.write_image(np.ones((2, 2, 3), np.uint32)) and sink.close()
+    )
+    with pytest.raises(InputError, match="x.exr: holds whole numbers of 32 bits"):
+        read_image(tmp_path / "x.exr")
 
 
 def test_the_layer_that_is_named_as_a_picture_is_taken(tmp_path):
@@ -259,23 +265,27 @@ def test_what_any_list_holds_out_is_held_out(tmp_path, capsys, lists, train, tes
         assert {names[name] for name in load_dataset(tmp_path, "test").frame_names} == test
 
 
-def test_images_of_other_files_and_names_without_a_frame_are_said(tmp_path, capsys):
+@pytest.mark.parametrize("split", ["test", "val"])
+def test_images_of_other_files_and_names_without_a_frame_are_said(tmp_path, capsys, split):
     """transforms.json has all photos, and another file those for testing; a list has a name of its own."""
     make_blender(tmp_path, train=6, test=1)
     content = json.loads((tmp_path / "transforms_train.json").read_text())
     (tmp_path / "transforms_train.json").rename(tmp_path / "transforms.json")
-    (tmp_path / "transforms_test.json").write_text(json.dumps(content | {"frames": content["frames"][:2]}))
+    (tmp_path / "transforms_test.json").unlink()
+    other = tmp_path / f"transforms_{split}.json"
+    other.write_text(json.dumps(content | {"frames": content["frames"][:2]}))
     assert load_dataset(tmp_path).frame_names == ["r_2", "r_3", "r_4", "r_5"]
+    assert load_dataset(tmp_path, "test").frame_names == ["r_0", "r_1"]
     assert "images of transforms.json that a file holds out for testing are not trained on" in capsys.readouterr().err
-    (tmp_path / "transforms_test.json").write_text(json.dumps(content))
+    other.write_text(json.dumps(content))
     assert len(load_dataset(tmp_path).frame_names) == 6
     assert "the scores of test views are those of photos trained on" in capsys.readouterr().err
-    (tmp_path / "transforms_test.json").write_text(json.dumps(content | {"frames": []}))
+    other.write_text(json.dumps(content | {"frames": []}))
     assert len(load_dataset(tmp_path)) == 5 and len(load_dataset(tmp_path, "test")) == 1  # every 8th
     (tmp_path / "transforms.json").rename(tmp_path / "transforms_train.json")
     assert not has_test_split(tmp_path) and len(load_dataset(tmp_path)) == 6
     (tmp_path / "transforms_train.json").rename(tmp_path / "transforms.json")
-    (tmp_path / "transforms_test.json").unlink()
+    other.unlink()
     write_image(tmp_path / "masks/a.png", np.ones((4, 4)))
     assert transforms.read(tmp_path, None)[1].mask_path is None
     assert "masks: no frame has a mask there; 'mask_path' of a frame would name it" in capsys.readouterr().err

@@ -10,15 +10,13 @@ import pytest
 import torch
 from blender_data import look_at
 from splitnerf.cli import main
-from splitnerf.data.dataset import Dataset, load_dataset, write_ground
-from splitnerf.data.gltf import read_asset
+from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.data.json_files import read_json
 from splitnerf.data.normalisation import box_of_views, transform_points
 from splitnerf.data.photos import separated_mask
 from splitnerf.data.reading import SEPARATED, Reading
 from splitnerf.errors import InputError
-from splitnerf.export.simplify import is_closed
 from splitnerf_tools.capture import masks as capture_masks
 from splitnerf_tools.separation import separate as separation
 from splitnerf_tools.separation import training
@@ -113,8 +111,8 @@ def ball_on_floor(
     return colours, np.where(hit, t_ball, t_floor), hit
 
 
-def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False, true: bool = False) -> list[np.ndarray]:
-    """Photos without masks of the ball, or with an alpha that is 1 everywhere or the true mask; returns the true masks."""
+def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False) -> list[np.ndarray]:
+    """Photos without masks of the ball, or with an alpha that is 1 everywhere; returns the true masks."""
     frames, masks = [], []
     for i in range(n):
         angle, height = 2.4 * i, 0.9 + 1.2 * (i % 5) / 4
@@ -123,9 +121,7 @@ def write_ball_on_floor(root, n: int = 20, *, alpha: bool = False, true: bool = 
         rays = np.stack([(x - SIZE / 2) / FOCAL, -(y - SIZE / 2) / FOCAL, -np.ones_like(x)], -1) @ pose[:3, :3].T
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         image, _, mask = ball_on_floor(np.broadcast_to(pose[:3, 3], rays.shape), rays)
-        write_image(
-            root / f"images/p{i}.png", np.dstack([image, mask if true else np.ones_like(mask)]) if alpha else image
-        )
+        write_image(root / f"images/p{i}.png", np.dstack([image, np.ones((SIZE, SIZE))]) if alpha else image)
         frames.append({"file_path": f"images/p{i}.png", "transform_matrix": pose.tolist()})
         masks.append(mask)
     lens = {"fl_x": FOCAL, "fl_y": FOCAL, "cx": SIZE / 2, "cy": SIZE / 2, "w": SIZE, "h": SIZE}
@@ -219,20 +215,6 @@ def test_from_photos_without_masks_to_an_asset(tmp_path, capsys, monkeypatch):
     assert train(tmp_path / "data", run, *again) == 0 and overlap(run, masks) > 0.9  # found anew
     (run / SEPARATED / "separation.json").unlink()
     assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 2
-
-
-def test_an_asset_ends_at_the_ground(tmp_path):
-    """A ball that stands in it: what training and a later export write is closed, and has nothing below it."""
-    write_ball_on_floor(tmp_path / "data", alpha=True, true=True)
-    write_ground(tmp_path / "data", np.array([0, 0.6, 0.8, 0.2]))
-    assert train(tmp_path / "data", tmp_path / "run", "--eval-mode", "all", "--steps", "30") == 0
-    assert main(["export", str(tmp_path / "run"), "--out", str(tmp_path / "again"), "--formats", "glb"]) == 0
-    for folder in ("run", "again"):
-        asset = read_asset(tmp_path / folder / "mesh.glb")
-        heights = asset.vertices @ [0, 0.6, 0.8] - 0.2
-        assert abs(heights.min()) < 1e-3 and heights.max() > 0.25
-        _, place = np.unique(asset.vertices, axis=0, return_inverse=True)
-        assert is_closed(place.reshape(-1)[asset.triangles])
 
 
 def test_prepare_looks_for_the_table_in_the_field_where_sparse_points_show_none(tmp_path, monkeypatch):

@@ -343,6 +343,10 @@ def _opened(path: Path, name: str, *, whole: bool = False) -> Iterator[tuple[oii
         spec = _first_picture(source, path) if source.format_name() == "openexr" else source.spec()
         if spec.deep:
             raise InputError(f"{name}: holds several samples a pixel (deep); flatten it")
+        if str(spec.format) == "uint":
+            raise InputError(
+                f"{name}: holds whole numbers of 32 bits, which are no colours; re-export it in half or float"
+            )
         n_values = spec.width * spec.height * spec.depth * spec.nchannels
         size = f"{spec.width}x{spec.height}"
         if min(spec.width, spec.height) < 1 or spec.depth > 1 or n_values > VALUES_PER_BYTE * path.stat().st_size:

@@ -25,6 +25,11 @@ def read_json(path: Path, key: str) -> dict:
     return content
 
 
+def is_number(value: object) -> bool:
+    """Whether a value is a number; true and false are none."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 def need(table: dict, key: str, path: Path, where: str = "") -> object:
     """The value of a key. Raises InputError where it is missing; `where` follows the key in the message."""
     if key not in table:

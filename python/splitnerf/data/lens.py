@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from splitnerf.data.json_files import is_number
 from splitnerf.errors import InputError, note_once, shown
 
 SMALLEST, LARGEST = 1e-6, 1e9  # bounds of a pinhole's numbers
@@ -110,13 +111,13 @@ def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
         )
     coefficients = {key: numbers.pop(key, 0.0) for key in RADIAL + TANGENTIAL}
     for key, value in coefficients.items():
-        if not isinstance(value, (int, float)) or not abs(value) <= LARGEST_COEFFICIENT:
+        if not is_number(value) or not abs(value) <= LARGEST_COEFFICIENT:
             raise InputError(f"{where}: '{key}' is no coefficient of a lens: {shown(value)}; repair it")
     if not numbers.keys() & {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"}:
         raise InputError(f"{where}: missing key 'camera_angle_x' (or 'fl_x'); add it")
     for key, value in numbers.items():
         placed = key in ("cx", "cy")  # which may lie outside of a crop
-        valid = isinstance(value, (int, float)) and (-LARGEST if placed else SMALLEST) <= value <= LARGEST
+        valid = is_number(value) and (-LARGEST if placed else SMALLEST) <= value <= LARGEST
         if not valid or (key.startswith("camera_angle") and value >= np.pi):
             kind = "number" if placed else "positive number"
             kind += " of radians below pi" if key.startswith("camera_angle") else ""

@@ -1,7 +1,7 @@
 """Transforms files: NeRF-Blender, nerfstudio (Polycam, Metashape, Record3D and others through it) and instant-ngp.
 
 Files:
-    transforms_train.json, transforms_test.json   a file for each split (NeRF-Blender)
+    transforms_train.json, transforms_test.json   a file for each split (NeRF-Blender); without the second transforms_val.json
     transforms.json                               all frames; `train_filenames`, `test_filenames` or `val_filenames` may
                                                   list the splits
 
@@ -30,7 +30,7 @@ from unicodedata import normalize
 import numpy as np
 
 from splitnerf.data.images import HDR_SUFFIXES, LDR_SUFFIXES
-from splitnerf.data.json_files import need, read_json
+from splitnerf.data.json_files import is_number, need, read_json
 from splitnerf.data.layouts.frame import RIGID_TOLERANCE, Frame, checked_pose, listed_file, listed_image
 from splitnerf.data.lens import RADIAL, TANGENTIAL, Distortion, read_lens
 from splitnerf.data.reading import MASK_KINDS
@@ -56,7 +56,7 @@ OF_FRAME = OF_BOTH | {
 
 def present(root: Path) -> bool:
     """Whether a folder has a transforms file."""
-    return any((root / name).is_file() for name in (SINGLE, *map(_own, SPLITS)))
+    return any(path.is_file() for path in (root / SINGLE, *(_own(root, split) for split in SPLITS)))
 
 
 def splits(root: Path) -> list[str] | None:
@@ -71,7 +71,7 @@ def read(root: Path, split: str | None) -> list[Frame]:
     """The frames of a split, or all, in the order of the files. Raises InputError where a file is missing or unusable,
     or a frame has no image, no usable pose or no lens."""
     if split is None:
-        own = [root / _own(name) for name in _own_splits(root)]
+        own = [_own(root, name) for name in _own_splits(root)]
         frames: dict[Path, Frame] = {}
         for path in own or [root / SINGLE]:
             for frame in _frames(path, None):
@@ -80,7 +80,7 @@ def read(root: Path, split: str | None) -> list[Frame]:
                 ):
                     raise InputError(f"{path}: has two poses of {frame.image_path.name}; remove one")
         return list(frames.values())
-    own = root / _own(split)
+    own = _own(root, split)
     if not own.is_file() and not (root / SINGLE).is_file():
         raise InputError(f"{root}: has neither {own.name} nor {SINGLE}; add posed images for the {split} split")
     if split not in _own_splits(root) and (root / SINGLE).is_file():
@@ -100,14 +100,16 @@ def read_camera_path(path: Path) -> list[tuple[np.ndarray, dict]]:
     return [camera[:2] for camera in cameras]
 
 
-def _own(split: str) -> str:
-    return f"transforms_{split}.json"
+def _own(root: Path, split: str) -> Path:
+    """The file of a split; that of validation where testing has none."""
+    paths = [root / f"transforms_{name}.json" for name in ((split, "val") if split == "test" else (split,))]
+    return next((path for path in paths if path.is_file()), paths[0])
 
 
 def _own_splits(root: Path) -> list[str]:
     """The splits with a file of their own; one for testing without frames holds nothing out."""
-    found = [split for split in SPLITS if (root / _own(split)).is_file()]
-    return [split for split in found if split == "train" or read_json(root / _own(split), "frames").get("frames") != []]
+    found = [split for split in SPLITS if _own(root, split).is_file()]
+    return [split for split in found if split == "train" or read_json(_own(root, split), "frames").get("frames") != []]
 
 
 def _has_lists(meta: dict) -> bool:
@@ -129,7 +131,7 @@ def _image(name: object, root: Path) -> str:
 
 def _of_other_files(root: Path, split: str) -> set[str]:
     """The images that the files of test and validation hold, which are none of the train split's."""
-    files = [root / _own(name) for name in ("test", "val")] if split == "train" else []
+    files = [root / f"transforms_{name}.json" for name in ("test", "val")] if split == "train" else []
     found = [read_json(path, "frames").get("frames") for path in files if path.is_file()]
     entries = [entry for frames in found if isinstance(frames, list) for entry in frames if isinstance(entry, dict)]
     return {_image(entry.get("file_path"), root) for entry in entries}
@@ -246,7 +248,7 @@ def _read_turn(matrix: object, index: int, path: Path) -> np.ndarray | None:
 
 def _read_exposure(entry: dict, index: int, path: Path) -> float:
     exposure = entry.get("exposure", 1.0)
-    if not isinstance(exposure, (int, float)) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
+    if not is_number(exposure) or not SMALLEST_EXPOSURE <= exposure <= 1 / SMALLEST_EXPOSURE:
         raise InputError(
             f"{path}: 'exposure' of frame {index} must be a positive number, got {shown(exposure)}; repair it"
         )
@@ -254,7 +256,7 @@ def _read_exposure(entry: dict, index: int, path: Path) -> float:
 
 
 def _read_gamma(gamma: object, path: Path) -> float:
-    if not isinstance(gamma, (int, float)) or not (gamma == 0 or 1 <= gamma <= LARGEST_GAMMA):
+    if not is_number(gamma) or not (gamma == 0 or 1 <= gamma <= LARGEST_GAMMA):
         raise InputError(
             f"{path}: 'gamma' must be 0 (sRGB's curve) or a number from 1 to {LARGEST_GAMMA:g}, got {shown(gamma)}; repair it"
         )
@@ -288,7 +290,7 @@ def _lens_numbers(entry: dict, meta: dict, where: str) -> dict:
     width, height, w, h = own.get("w"), own.get("h"), shared.get("w"), shared.get("h")
     if not _are_positive(width, height, w, h) or (width, height) == (w, h):
         return shared | own
-    taken = {key for key, value in shared.items() if key not in own and isinstance(value, (int, float))}
+    taken = {key for key, value in shared.items() if key not in own and is_number(value)}
     if abs(width * h - height * w) <= max(width, height, w, h):
         factors = {"fl_x": width / w, "cx": width / w, "fl_y": height / h, "cy": height / h}
         return shared | {key: shared[key] * factors[key] for key in taken & factors.keys()} | own
@@ -300,4 +302,4 @@ def _lens_numbers(entry: dict, meta: dict, where: str) -> dict:
 
 def _are_positive(*values: object) -> bool:
     """Whether all are positive numbers."""
-    return all(isinstance(value, (int, float)) and value > 0 for value in values)
+    return all(is_number(value) and value > 0 for value in values)
