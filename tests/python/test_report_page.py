@@ -59,7 +59,7 @@ def report(ball, tmp_path_factory):
     terms = [{"loss_colour": 10.0**-i, "loss_light": 0.5, "loss_late": 0.0 if i < 5 else 1e-3} for i in range(9)]
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
     summary = {"Settings": {f"s{i}": i for i in range(30)}}
-    lights = {"lights": [], "light_truth": true, "light": sky(32)}
+    lights = {"lights": [{"roughness": 0.0, "g": sky(32)}], "light_truth": true, "light": sky(32)}
     times = {"history": history, "timings": {"training": 3.0}}
     shown = {"summary": summary, "views": views, "asset": folder / "mesh.glb"}
     write_report(folder / "report.html", title="two </script> views", **shown, **lights, **times)
@@ -156,6 +156,7 @@ def seen(report):
         {"do": "set", "selector": "#object [name=exposure]", "value": 2},
         part("brighter", object_),
         {"do": "size", "width": 380, "height": 700},
+        say("unfolded", "document.querySelectorAll('details').forEach((e) => (e.open = true))"),
         say("overflow", "document.documentElement.scrollWidth - innerWidth"),
     ]
     told = look(report, steps)
@@ -211,8 +212,8 @@ def test_curves_say_the_values_under_the_pointer(seen):
     texts = seen[0]["texts"]
     assert texts["tip"].split("\n") == ["step 200", "loss 0.25"]
     assert texts["last"].split("\n") == ["step 800", "loss 0.003906"]
-    assert texts["terms"].split("\n") == ["step 800", "colour 1.000e-8", "late 0.001", "light 0.5"]
-    assert texts["fewer"].split("\n") == ["step 800", "colour 1.000e-8", "light 0.5"]
+    assert texts["terms"].split("\n") == ["step 800", "colour 1e-8", "late 0.001", "light 0.5"]
+    assert texts["fewer"].split("\n") == ["step 800", "colour 1e-8", "light 0.5"]
     assert texts["zero"].split("\n") == ["step 0", "colour 1", "light 0.5"]
 
 

@@ -78,6 +78,6 @@ export async function unpacked(text) {
 /** A number for readers: about so many digits that count, never an exponent of small ones. */
 export function short(value, digits = 3) {
   if (!Number.isFinite(value)) return "–";
-  if (Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-4)) return value.toExponential(digits - 1);
+  if (Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-4)) return value.toExponential(digits - 1).replace(/\.?0+e/, "e");
   return String(Number(value.toPrecision(digits)));
 }

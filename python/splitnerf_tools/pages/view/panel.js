@@ -19,7 +19,7 @@ export class Panel extends Controls {
     const photos = element("fieldset", {}, check("cameras", "Cameras (click one)"), select("through", "Look through", [[-1, "none"], ...names]));
     const files = description.sources.flatMap(({ name, facts }, i) => {
       const file = `${name.replace(/\.glb$/i, "")}.glb`;
-      return facts ? [element("p", { class: "hint" }, element("a", { href: `assets/${i}`, download: file }, file), ` ${facts}`)] : [];
+      return facts ? [element("p", { class: "hint" }, element("a", { href: `assets/${i}`, download: file }, file), `: ${facts}`)] : [];
     });
     const last = names.length ? [photos, ...files] : files;
     super(field("panel"), viewer, {
