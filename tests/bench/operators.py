@@ -15,15 +15,12 @@ def main() -> None:
     from splitnerf_tools.bench.harness import run_benchmarks
 
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument(
-        "name", nargs="?", choices=NAMES, metavar="NAME", help=f"one of {', '.join(NAMES)} (default: all)"
-    )
+    parser.add_argument("name", nargs="?", choices=NAMES, help="default: all")
     parser.add_argument("--quick", action="store_true", help="small inputs and few rounds")
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks"))
     args = parser.parse_args()
-    for path in run_benchmarks(
-        [f"bench.{name}" for name in ([args.name] if args.name else NAMES)], args.quick, args.out, print
-    ):
+    modules = [f"bench.{name}" for name in ([args.name] if args.name else NAMES)]
+    for path in run_benchmarks(modules, args.quick, args.out, print):
         print(path)
 
 

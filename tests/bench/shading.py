@@ -15,13 +15,8 @@ from torch.nn import functional as F
 
 TOLERANCE = 1e-3  # error of results and gradients, relative to the largest value
 FLOATS_A_POINT = 23 + 3  # read forward and written
-SOURCES = (
-    "cpp/*split_sum*",
-    "cpp/*shad*",
-    "cpp/*prefilter*",
-    "python/splitnerf/ops/shading.py",
-    "python/splitnerf/ops/light.py",
-)
+SOURCES = ("cpp/*split_sum*", "cpp/*shad*", "cpp/*prefilter*")
+SOURCES += ("python/splitnerf/ops/shading.py", "python/splitnerf/ops/light.py")
 FLOATS_BACK = 26 + 23  # read backward and written
 
 

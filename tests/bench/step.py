@@ -19,14 +19,8 @@ from pathlib import Path
 CASES = tuple((isa, threads) for isa in ("avx2", "avx512") for threads in (1, 2))
 LATE = 0.9  # the progress of the timed steps
 LEAST = 0.4  # ms, below which an operator is counted with the others
-SOURCES = (
-    "cpp/src",
-    "cpp/include",
-    "cpp/torch",
-    "python/splitnerf/training",
-    "python/splitnerf/render",
-    "python/splitnerf/fields",
-)
+SOURCES = tuple(f"cpp/{name}" for name in ("src", "include", "torch"))
+SOURCES += tuple(f"python/splitnerf/{name}" for name in ("training", "render", "fields"))
 
 
 def measured(run: Path, data: Path, n_steps: int) -> dict:
@@ -109,32 +103,17 @@ def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int) -> dict |
 
 def page(cases: dict[tuple[str, int], dict], head: str) -> str:
     """The page of docs/benchmarks."""
-    isas = sorted({isa for isa, _ in cases})
-    lines = [
-        "# A training step",
-        "",
-        head,
-        "",
-        f"{next(iter(cases.values()))['rays']} rays a step, near the end of a run.",
-        "",
-    ]
+    rays = next(iter(cases.values()))["rays"]
+    lines = ["# A training step", "", head, "", f"{rays} rays a step, near the end of a run.", ""]
     lines += ["| | " + " | ".join(f"{isa}, {threads} thread{'s' * (threads > 1)}" for isa, threads in cases) + " |"]
     lines += ["|---|" + "---|" * len(cases)]
-    for name, unit, key in (
-        ("a step", "ms", "wall"),
-        ("copying memory", "GB/s", "copy"),
-        ("a matrix product", "GFLOP/s", "flops"),
-    ):
-        lines.append(f"| {name}, {unit} | " + " | ".join(f"{case[key]:.1f}" for case in cases.values()) + " |")
-    for isa in isas:
+    rows = {"wall": "a step, ms", "copy": "copying memory, GB/s", "flops": "a matrix product, GFLOP/s"}
+    for key, name in rows.items():
+        lines.append(f"| {name} | " + " | ".join(f"{case[key]:.1f}" for case in cases.values()) + " |")
+    columns = "| operator | ms | calls | ms on 2 threads | divided | 8 cores, by count | MB | GB/s |"
+    for isa in sorted({isa for isa, _ in cases}):
         one, two = cases[isa, 1], cases[isa, 2]
-        lines += [
-            "",
-            f"## {isa}",
-            "",
-            "| operator | ms | calls | ms on 2 threads | divided | 8 cores, by count | MB | GB/s |",
-        ]
-        lines += ["|---|---|---|---|---|---|---|---|"]
+        lines += ["", f"## {isa}", "", columns, "|---" * 8 + "|"]
         small, eight = [0.0, 0.0, 0.0], 0.0
         ordered = sorted(one["rows"].items(), key=lambda row: -row[1][0])
         for name, (ms, calls, moved) in ordered:

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 from painted_ball import lamps, looking, orange
 from splitnerf.cli import main
+from splitnerf.data.dataset import load_dataset
 from splitnerf.data.images import read_image, write_image
 from splitnerf.export.writers import write_glb
 from splitnerf_tools.demo.scene import write_demo_dataset
@@ -128,6 +129,16 @@ def run_blender(name: str, *arguments: str) -> str:
     done = subprocess.run([BLENDER, str(EXAMPLES / name), *arguments], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def test_blender_photographs_a_matte_jug(tmp_path):
+    """Two views and one for testing, that load with their cameras, the jug in their middle."""
+    write_image(tmp_path / "light.exr", np.ones((8, 16, 3), np.float32))
+    words = ["--kinds", "matte", "--views", "2", "1", "--size", "32", "--samples", "4"]
+    run_blender("blender_kinds.py", str(tmp_path / "light.exr"), str(tmp_path), *words)
+    views = load_dataset(tmp_path / "matte", "train")
+    alpha = views.images[..., 3]
+    assert len(views) == 2 and (alpha[:, 16, 16] == 1).all() and (alpha[:, :, [0, -1]] == 0).all()
 
 
 def test_blender_shows_what_relight_shows(ball, tmp_path):
