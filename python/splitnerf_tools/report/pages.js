@@ -1,4 +1,4 @@
-/* sources b4453d5cf6160419594e23d5319e26b757a28964cc1a7206ddb2d0ce127cd7bd: main.js report/compare.js report/curves.js report/differences.js report/files.js report/light.js report/main.js report/object.js report/style.css view/cameras.js view/channels.js view/chart.js view/connection.js view/controls.css view/controls.js view/drop.js view/elements.js view/final.js view/ground.js view/halves.js view/main.js view/panel.js view/server.js view/style.css view/training.js view/view.js view/viewer.js
+/* sources 5f5bc53e7584b9e83ece9ab760b44205e2e10cb0680c383e2cc4a9c6acc2db07: main.js report/compare.js report/curves.js report/differences.js report/files.js report/light.js report/main.js report/object.js report/style.css view/cameras.js view/channels.js view/chart.js view/connection.js view/controls.css view/controls.js view/drop.js view/elements.js view/final.js view/ground.js view/halves.js view/main.js view/panel.js view/server.js view/style.css view/training.js view/view.js view/viewer.js
 contains three:
 
 The MIT License
@@ -4431,6 +4431,7 @@ body { display: flex; overflow: hidden; background: var(--grey); color: var(--te
 #photos { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
 #photos .stage { position: absolute; }
 #photos img { width: 100%; height: 100%; }
+#photos .tag { top: 44px; } /* below the names and the panel's button */
 #photos .stage > input::-webkit-slider-thumb { width: 32px; pointer-events: auto; }
 #photos .stage > input::-moz-range-thumb { width: 32px; pointer-events: auto; }
 
