@@ -7,7 +7,7 @@ import pytest
 from blender_data import SIZE, edit, look_at, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, LENS, RADIUS, sphere_poses, write_transforms
 from op_checks import generator
-from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset
+from splitnerf.data.dataset import Dataset, dataset_fingerprint, load_dataset, write_ground
 from splitnerf.data.images import write_image
 from splitnerf.data.normalisation import MasksContradict, estimate_box, nearest_to_rays, transform_points
 from splitnerf.data.reading import Reading
@@ -322,7 +322,9 @@ def test_an_origin_far_away_is_brought_near(tmp_path):
     moved[:3, 3] = survey
     for i in range(COUNT):
         edit(root, set_pose(i, lambda pose: (pose + moved).tolist()), "transforms.json")
+    write_ground(root, np.array([0, 0.6, 0.8, survey @ [0, 0.6, 0.8]]))
     far, test = load_dataset(root), load_dataset(root, "test")
+    assert far.ground[3] == pytest.approx((survey - far.origin) @ [0, 0.6, 0.8], abs=1e-6)
     assert np.array_equal(far.origin, test.origin) and np.array_equal(far.origin, np.round(far.origin / 10) * 10)
     assert far.world_poses[:, :3, 3] + far.origin == pytest.approx(near.world_poses[:, :3, 3] + survey, abs=1e-4)
     assert np.abs(far.origin - survey).max() < 10 and np.abs(far.world_poses[:, :3, 3]).max() < 20

@@ -302,7 +302,7 @@ def load_dataset(
         exposures=loader.exposures,
         stated=np.array([frame.exposure for frame in frames]),
         surroundings=read_surroundings(path) if (path := _found(SURROUNDINGS, root, reading)) else None,
-        ground=_read_ground(path) if (path := _found(GROUND, root, reading)) else None,
+        ground=_read_ground(path, origin * (path.parent == root)) if (path := _found(GROUND, root, reading)) else None,
         light_turns=_light_turns(frames),
         behind_paths=behind_paths,
         masked=_has_masks(photos),
@@ -321,8 +321,8 @@ def write_ground(folder: Path, plane: np.ndarray) -> None:
     write_json(folder / GROUND, {"normal": plane[:3].tolist(), "offset": float(plane[3])})
 
 
-def _read_ground(path: Path) -> np.ndarray:
-    """The plane of a file. Raises InputError where it is none."""
+def _read_ground(path: Path, origin: np.ndarray) -> np.ndarray:
+    """The plane of a file, seen from an origin [3]. Raises InputError where it is none."""
     content = read_json(path, "normal")
     try:
         normal, offset = np.array(content["normal"], np.float64), float(content["offset"])
@@ -332,7 +332,7 @@ def _read_ground(path: Path) -> np.ndarray:
         raise InputError(
             f"{path}: is no plane: 'normal' of three numbers, of length 1, and 'offset'; repair or delete it"
         )
-    return np.append(normal, offset)
+    return np.append(normal, offset - normal @ origin)
 
 
 def _behind_path(frame: Frame, root: Path, reading: Reading) -> Path | None:

@@ -34,7 +34,8 @@ def find_masks(
     out: Path, world: World, seed: int, turntable: bool, report: Callable[[float], None]
 ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """The masks [h, w] in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own, and what is behind
-    the object, see :func:`splitnerf_tools.separation.masks.with_background`; None on a turntable, where it moves.
+    the object, see :func:`splitnerf_tools.separation.masks.with_background`; None on a turntable, where it moves. Writes the plane
+    of the table to `out`, before the first mask.
 
     Args:
         out: The folder of the undistorted photos.

@@ -207,8 +207,8 @@ def write_data(
     settings: PrepareSettings,
     report: Callable[[str, float], None],
 ) -> np.ndarray:
-    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr`, and `behind/` with found masks; returns the share that each
-    mask covers."""
+    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr`, and with found masks `behind/` and `ground.json`; returns the
+    share that each mask covers."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
     for folder in ("images", "masks"):
         (out / folder).mkdir(exist_ok=True)

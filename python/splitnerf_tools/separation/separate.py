@@ -31,8 +31,8 @@ MOST_POINTS = 20000  # of those that the search for the table takes
 
 
 def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, minutes: float, seed: int) -> float:
-    """Writes a mask for each photo, what is behind the object, `surroundings.exr`, and `sheet.jpg`, which shows some of the
-    masks, into an empty folder; returns the seconds that it took.
+    """Writes a mask for each photo, what is behind the object, `surroundings.exr`, `ground.json` where a table is found, and
+    `sheet.jpg`, which shows some of the masks, into an empty folder; returns the seconds that it took.
 
     A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
     plane of a table if there is one, and hangs together in the middle, is the object.
