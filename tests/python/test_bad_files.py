@@ -170,6 +170,7 @@ GROUND = {
     "no normal": (ground(offset=0), "ground.json: is no plane"),
     "two numbers": (ground(normal=[0, 1], offset=0), "ground.json: is no plane"),
     "not of length 1": (ground(normal=[0, 0, 2], offset=0), "ground.json: is no plane"),
+    "NaN offset": (ground(normal=[0, 0, 1], offset=float("nan")), "ground.json: is no plane"),
     "no offset": (ground(normal=[0, 0, 1], offset="low"), "ground.json: is no plane"),
 }
 
