@@ -216,11 +216,9 @@ def test_colours_before_a_known_background_tell_the_coverage():
     colour = linear_to_srgb(true[..., None] * inner + (1 - true[..., None]) * outer)
     behind = np.concatenate([np.broadcast_to(linear_to_srgb(outer * exposure), (40, 64, 3)), np.ones((40, 64, 1))], -1)
     behind[20:, :, 3] = 0
-    behind[:5, :, :3] = 1
     found = by_colours(np.dstack([colour, mask]), behind.astype(np.float32), exposure)
-    assert np.abs(found - true)[5:20].max() < 0.3 < 0.9 < np.abs(mask - true).max()
+    assert np.abs(found - true)[:20].max() < 0.3 < 0.9 < np.abs(mask - true).max()
     np.testing.assert_array_equal(found[20:], mask[20:])  # it is unknown there
-    np.testing.assert_array_equal(found[:5], mask[:5])  # and clipped there
     alike = by_colours(
         np.dstack([np.full_like(colour, 0.5), mask]), np.full((40, 64, 4), 0.5, np.float32), exposure / exposure
     )

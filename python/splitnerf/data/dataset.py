@@ -36,6 +36,7 @@ from splitnerf.progress import tracked
 SURROUNDINGS = "surroundings.exr"
 GROUND = "ground.json"
 BEHIND = "behind"  # the folder of what is behind the object, in that of separated data
+CLIPPED = 250 / 255  # sRGB from which on a background may be brighter than the photo says
 EXPOSURES = "exposures.json"  # in a run: the exposures of photos that it learned
 JPEG = (".jpg", ".jpeg")
 HULL_VIEWS = 40
@@ -135,7 +136,7 @@ class Dataset:
 
     def behind(self, view: int) -> np.ndarray | None:
         """[H, W, 4] float32, what a photo would show without the object: sRGB at the photo's own exposure, and 1 where that is
-        known, along the mask's edges, else 0; None where the data do not say.
+        known and not clipped, along the mask's edges, else 0; None where the data do not say.
 
         Raises:
             InputError: The file cannot be read.
@@ -148,7 +149,7 @@ class Dataset:
         planes = torch.from_numpy(image).permute(2, 0, 1)[None]
         planes = interpolate(planes, (height, width), mode="bilinear", antialias=True, align_corners=False)[0]
         image = planes.permute(1, 2, 0).numpy()
-        known = image[..., 3:] > CERTAIN
+        known = (image[..., 3:] > CERTAIN) & (image[..., :3].max(-1, keepdims=True) < CLIPPED)
         return self.padded(np.where(known, np.concatenate([image[..., :3], known], axis=-1), np.float32(0)))
 
     @property

@@ -30,7 +30,6 @@ SMOOTH, ANCHOR = 0.3, 0.02
 BATCH = 4096  # pixels
 # pixels inside a mask's edge from which on a photo shows the object alone, and over which its colour is a mean
 INNER, WINDOW = 3, 5
-CLIPPED = 0.98  # sRGB from which on a background may be brighter than the photo says
 # standard errors of sRGB colours, of a mask's coverage, and of that by colours at least
 NOISE, BY_MASK, BY_COLOUR = 0.05, 0.1, 0.05
 MOST = 1 << 22  # pixels near the edges, about; each needs rays and rows of a matrix
@@ -69,7 +68,6 @@ def by_colours(photo: np.ndarray, behind: np.ndarray, exposure: np.ndarray) -> n
     """
     colour, mask = photo[..., :3], photo[..., 3]
     core = distance_transform_edt(mask > 0.5) > INNER
-    known = (behind[..., 3] > 0) & (behind[..., :3].max(-1) < CLIPPED)
     if not core.any():
         return mask
     nearest = tuple(distance_transform_edt(~core, return_distances=False, return_indices=True))
@@ -80,7 +78,7 @@ def by_colours(photo: np.ndarray, behind: np.ndarray, exposure: np.ndarray) -> n
     size = (weights * (inner - outer) ** 2).sum(-1).clip(1e-12)
     share = ((weights * (inner - outer) * (shown - outer)).sum(-1) / size).clip(0, 1)
     misfit = (weights * (shown - outer - share[..., None] * (inner - outer)) ** 2).sum(-1)
-    weight = np.where(known, BY_MASK**2 / np.maximum((NOISE**2 + misfit) / size, BY_COLOUR**2), 0)
+    weight = np.where(behind[..., 3] > 0, BY_MASK**2 / np.maximum((NOISE**2 + misfit) / size, BY_COLOUR**2), 0)
     return (mask + weight * share) / (1 + weight)
 
 

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.config import Config
-from splitnerf.data.dataset import Dataset
+from splitnerf.data.dataset import CLIPPED, Dataset
 from splitnerf.data.lens import pixel_width
 from splitnerf.data.pixels import ask_for, at_unit_exposure, averaged_codes, decoded
 from splitnerf.errors import note
@@ -67,7 +67,6 @@ def without_fine_levels(dataset: Dataset, config: Config) -> Config:
 
 
 PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
-BRIGHTEST = 250  # of 255: a brighter background may be clipped, so that the mask decides where the edge is
 
 
 def edge_runs(
@@ -96,8 +95,7 @@ def edge_of(
     near, behind = edge_mask(colours, alpha, known, width)
     if told is not None:
         codes = (255 * told[near] + 0.5).astype(np.uint8)
-        sure = (codes[:, 3] > 0) & (codes[:, :3].max(axis=1) < BRIGHTEST)
-        behind = np.where(sure[:, None], codes[:, :3], behind)
+        behind = np.where(codes[:, 3:] > 0, codes[:, :3], behind)
     return runs_of(torch.from_numpy(near)), behind
 
 
@@ -111,7 +109,7 @@ def edge_mask(
     place, behind = filled_in(colours, near, outside, width)
     scale = 255 if colours.dtype.kind == "f" else 255 / np.iinfo(colours.dtype).max
     behind = (behind * np.float32(scale) + np.float32(0.5)).astype(np.uint8)
-    certain = behind.max(axis=1) < BRIGHTEST
+    certain = behind.max(axis=1) < 255 * CLIPPED  # elsewhere the mask decides where the edge is
     near = np.zeros_like(near)
     near.reshape(-1)[place[certain]] = True
     return near, behind[certain]

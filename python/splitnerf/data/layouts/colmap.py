@@ -1,6 +1,6 @@
 """COLMAP's sparse models: cameras and images, as text or binary (little endian).
 
-    sparse/0/ or sparse/, or either in colmap/   cameras.bin and images.bin, or cameras.txt and images.txt
+    sparse/0/ or sparse/, or either in colmap/   cameras.bin or cameras.txt, images.bin or images.txt
     images/                                      the images that the model names
     masks/NAME.jpg.png or masks/NAME.png         their masks, optional; what they mean is for :mod:`splitnerf.data.dataset`
 
@@ -26,6 +26,12 @@ from splitnerf.data.lens import MODELS, PARAMETERS, read_lens
 from splitnerf.errors import InputError, note_once
 
 PLACES = ("sparse", "colmap/sparse")
+FORMS = (
+    ("bin", "bin"),
+    ("txt", "txt"),
+    ("txt", "bin"),
+    ("bin", "txt"),
+)  # of cameras and images; binary files have all digits
 IMAGES, MASKS = "images", "masks"
 POINT_BYTES = 24  # of an image point: x, y and the number of its 3D point
 LONGEST_NAME = 4096  # bytes
@@ -90,12 +96,11 @@ def _model_files(root: Path) -> tuple[Path, Path] | None:
     for place in PLACES:
         numbered = [path for path in (root / place).glob("*") if path.name.isdigit()]
         for folder in () if found else (root / place, *numbered):
-            for ending in ("txt", "bin"):  # binary files have all digits
-                files = folder / f"cameras.{ending}", folder / f"images.{ending}"
-                if all(map(os.path.isfile, files)):
-                    if folder in found:
-                        note_once(f"{folder}: has a model as text and as binary files; the binary ones are read")
-                    found[folder] = files
+            pairs = [(folder / f"cameras.{one}", folder / f"images.{other}") for one, other in FORMS]
+            if there := [pair for pair in pairs if all(map(os.path.isfile, pair))]:
+                if len(there) > 1:
+                    note_once(f"{folder}: has files of both forms; {there[0][0].name} and {there[0][1].name} are read")
+                found[folder] = there[0]
     if len(found) < 2:
         return next(iter(found.values()), None)
     largest = max(found, key=lambda folder: (_n_images(found[folder][1]), folder))
