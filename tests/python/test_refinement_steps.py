@@ -11,7 +11,7 @@ from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
-from splitnerf.refinement.similar_texels import usual_gloss, weighted_medians
+from splitnerf.refinement.similar_texels import SimilarTexels, weighted_medians
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 from stability.cases import drawn_directions
 
@@ -112,17 +112,19 @@ def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
 
 def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     unknowns, red = two_colours(metallic=0.2)
-    found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)
+    found = SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
     # one colour
-    assert torch.isfinite(usual_gloss(unknowns[red], unknowns[red], one_place(unknowns[red]), 0)[:, 3]).all()
+    assert torch.isfinite(
+        SimilarTexels(unknowns[red], one_place(unknowns[red]), 0).usual_gloss(unknowns[red])[:, 3]
+    ).all()
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
     unknowns, red = two_colours(metallic=0.9)
     drawn = red & (unknowns[:, 4] < 0.9)
-    found = usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[:, 4]
+    found = SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[:, 4]
     assert drawn.sum() > 500 and (found[drawn] == 0.9).all() and found[~drawn].isnan().all()
 
 
@@ -132,10 +134,10 @@ def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
     of_gold, few = torch.arange(6000) < 4000, torch.arange(6000) % 5 == 0
     unknowns[:, 4] = torch.where(of_gold ^ few, 0.9, 0.1)
     positions[~of_gold.numpy()] += [0.7, 0, 0]
-    found = usual_gloss(unknowns, unknowns, positions, 0)[:, 4]
+    found = SimilarTexels(unknowns, positions, 0).usual_gloss(unknowns)[:, 4]
     assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
     # the colour alone takes all
-    assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[~of_gold & ~few, 4] == 0.9).all()
+    assert (SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[~of_gold & ~few, 4] == 0.9).all()
 
 
 def test_metal_does_not_spread_by_what_it_turned_into_metal():
@@ -143,8 +145,8 @@ def test_metal_does_not_spread_by_what_it_turned_into_metal():
     start = torch.full((3000, N_UNKNOWNS), 0.1)
     now = start.clone()
     now[torch.arange(3000) % 3 > 0, 4] = 0.9
-    assert usual_gloss(now, start, one_place(now), 0)[:, 4].isnan().all()
-    assert (usual_gloss(now, now, one_place(now), 0)[now[:, 4] < 0.5, 4] == 0.9).all()
+    assert SimilarTexels(start, one_place(now), 0).usual_gloss(now)[:, 4].isnan().all()
+    assert (SimilarTexels(now, one_place(now), 0).usual_gloss(now)[now[:, 4] < 0.5, 4] == 0.9).all()
 
 
 def test_where_nothing_is_usual_nothing_pulls_and_nothing_brakes():
@@ -163,7 +165,7 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
     unknowns[:, 3] = torch.where(few, 0.7, 0.2)
     for grey, roughness in ((0.50, 0.2), (0.1, 0.7)):
         unknowns[:, :3] = torch.where(few, grey, 0.55)[:, None]
-        assert (usual_gloss(unknowns, unknowns, one_place(unknowns), 0)[few, 3] == roughness).all()
+        assert (SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[few, 3] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
     assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
 

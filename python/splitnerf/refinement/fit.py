@@ -35,7 +35,7 @@ from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
 from splitnerf.refinement.pixels import HELD_OUT, PixelFilter, covered_pixels, held_out
-from splitnerf.refinement.similar_texels import usual_gloss
+from splitnerf.refinement.similar_texels import SimilarTexels
 from splitnerf.refinement.texels import (
     PATCH_PIXELS,
     AssetTexels,
@@ -215,7 +215,7 @@ class Refinement:
         self.light = EnvironmentLight(light * self.level)
         self.light_equations = LightEquations(self.light, surroundings=self.seen)
         self.unknowns = to_unknowns(self.texels.start)
-        self.equations = NormalEquations(self.unknowns, self.prior, KEEP)
+        self.equations, self.similar = NormalEquations(self.unknowns, self.prior, KEEP), None
 
     def find_level(self, held: np.ndarray) -> np.ndarray:
         """Begins with a brighter light where the texels tell of one and the photos held out, whose errors [n] are given, are
@@ -410,7 +410,9 @@ class Refinement:
                     f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
                 )
         limits = torch.tensor(STEP_LIMITS)
-        like = usual_gloss(self.unknowns, self.equations.start, self.texels.positions, s.seed)
+        if self.similar is None:
+            self.similar = SimilarTexels(self.equations.start, self.texels.positions, s.seed)
+        like = self.similar.usual_gloss(self.unknowns)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns
         if not bool(torch.isfinite(step).all()):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from scipy.cluster.vq import kmeans2, vq
@@ -17,8 +19,37 @@ NEAR = 0.08  # deviation of the places that count as one, as a share of the asse
 METAL = 0.5  # the usual metallic from which on a kind of texels is metal
 
 
-def usual_gloss(unknowns: Tensor, start: Tensor, positions: np.ndarray, seed: int) -> Tensor:
-    """The usual roughness and metallic of texels similar to each one: [m, n], NaN where there is no such value.
+class Kinds(NamedTuple):
+    """Texels of similar features, which are of one kind.
+
+    Attributes:
+        seen: [k] the numbers of the texels by which medians are found.
+        weights: [kinds, k] the weights with which these count for each kind: Gaussians of their distances from its centre. They
+            are not weighted by certainty: glossy texels would decide for all.
+        label: [m] the kind of each texel.
+    """
+
+    seen: np.ndarray
+    weights: np.ndarray
+    label: np.ndarray
+
+    @classmethod
+    def of(cls, features: np.ndarray, most: int, random: np.random.Generator) -> Kinds:
+        """The kinds, `most` at most, of texels with features [m, d], in units of the Gaussian's deviation."""
+        seen = random.permutation(len(features))[:N_SEEN]
+        apart = random.normal(scale=0.01, size=(len(seen), features.shape[1]))  # equal texels make no clusters
+        centres, _ = kmeans2(features[seen] + apart, min(most, len(seen)), minit="++", seed=random)
+        squared = cdist(centres, features[seen], "sqeuclidean")
+        weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
+        return cls(seen, weights, vq(features, centres)[0])
+
+    def usual(self, values: Tensor) -> Tensor:
+        """[m] the usual one of values [m] of each texel's kind, a weighted median."""
+        return torch.from_numpy(weighted_medians(values.numpy()[self.seen], self.weights)[self.label])
+
+
+class SimilarTexels:
+    """Texels that looked alike at the start of a fit, and the gloss that is usual among them.
 
     The usual roughness is that of a colour. The usual metallic is that of a colour in a place, before all steps,
     because metal that the prior made would spread to its neighbours. It counts only where it is metal, for texels with
@@ -26,42 +57,30 @@ def usual_gloss(unknowns: Tensor, start: Tensor, positions: np.ndarray, seed: in
     opposite is rare. Without the place, enamel would become metal where gold elsewhere has its colour.
 
     Args:
-        unknowns: [m, n], see :mod:`splitnerf.refinement.unknowns`.
-        start: [m, n] the unknowns before all steps.
+        start: [m, n] the unknowns before all steps, see :mod:`splitnerf.refinement.unknowns`.
         positions: [m, 3] the texels' points.
         seed: The seed of the texels by which kinds and medians are found.
     """
-    random = np.random.default_rng(seed)
-    near = NEAR * max(float(np.ptp(positions, axis=0).max()), 1e-12)
-    colours = unknowns[:, :3].double().numpy() / REACH
-    placed = np.hstack([colours, (positions - positions.mean(axis=0)) / near])
-    result = torch.full_like(unknowns, torch.nan)
-    result[:, ROUGHNESS] = usual(unknowns[:, ROUGHNESS], colours, N_COLOURS, random)
-    metallic = usual(start[:, METALLIC], placed, N_KINDS, random)
-    islands = (metallic >= METAL) & (unknowns[:, METALLIC] < metallic)
-    result[:, METALLIC] = torch.where(islands, metallic, torch.nan)
-    return result
 
+    def __init__(self, start: Tensor, positions: np.ndarray, seed: int):
+        random = np.random.default_rng(seed)
+        near = NEAR * max(float(np.ptp(positions, axis=0).max()), 1e-12)
+        colours = start[:, :3].double().numpy() / REACH
+        placed = np.hstack([colours, (positions - positions.mean(axis=0)) / near])
+        self._of_colour = Kinds.of(colours, N_COLOURS, random)
+        self._metallic = Kinds.of(placed, N_KINDS, random).usual(start[:, METALLIC])
 
-def usual(values: Tensor, features: np.ndarray, n_kinds: int, random: np.random.Generator) -> Tensor:
-    """[m] the usual value of each texel's kind.
+    def usual_gloss(self, unknowns: Tensor) -> Tensor:
+        """The usual roughness and metallic of texels similar to each one: [m, n], NaN where there is no such value.
 
-    Texels of similar features are of one kind. Its usual value is the median of the texels around, weighted by a
-    Gaussian of their distance from the kind's centre. They are not weighted by certainty: glossy texels would decide
-    for all.
-
-    Args:
-        values: [m].
-        features: [m, d], in units of the Gaussian's deviation.
-        random: What draws the texels by which kinds and medians are found.
-    """
-    seen = random.permutation(len(features))[:N_SEEN]
-    apart = random.normal(scale=0.01, size=(len(seen), features.shape[1]))  # equal texels make no clusters
-    centres, _ = kmeans2(features[seen] + apart, min(n_kinds, len(seen)), minit="++", seed=random)
-    label, _ = vq(features, centres)
-    squared = cdist(centres, features[seen], "sqeuclidean")
-    weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
-    return torch.from_numpy(weighted_medians(values.numpy()[seen], weights)[label])
+        Args:
+            unknowns: [m, n] as they are now.
+        """
+        result = torch.full_like(unknowns, torch.nan)
+        result[:, ROUGHNESS] = self._of_colour.usual(unknowns[:, ROUGHNESS])
+        islands = (self._metallic >= METAL) & (unknowns[:, METALLIC] < self._metallic)
+        result[:, METALLIC] = torch.where(islands, self._metallic, torch.nan)
+        return result
 
 
 def weighted_medians(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
