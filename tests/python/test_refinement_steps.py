@@ -115,10 +115,8 @@ def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
     found = SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)
     torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
     assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    # one colour
-    assert torch.isfinite(
-        SimilarTexels(unknowns[red], one_place(unknowns[red]), 0).usual_gloss(unknowns[red])[:, 3]
-    ).all()
+    one_colour = unknowns[red]
+    assert torch.isfinite(SimilarTexels(one_colour, one_place(one_colour), 0).usual_gloss(one_colour)[:, 3]).all()
 
 
 def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():

@@ -75,12 +75,11 @@ class TestRegion:
 
 def test_box_of_views():
     centre = np.array([5.0, -2, 1])
-    around = [[3, 0, 1], [0, 3, 1], [-3, 0, 2], [0, -3, 0.5]]
-    poses = np.stack([look_at(centre + np.array(at, float), centre) for at in around])
+    around = np.array([[3, 0, 1], [0, 3, 1], [-3, 0, 2], [0, -3, 0.5]])
+    poses = np.stack([look_at(centre + at, centre) for at in around])
     box = box_of_views(poses, np.full((4, 4), 50.0), np.full((4, 2), 40))
     np.testing.assert_allclose(box[:3, :3] @ centre + box[:3, 3], 0, atol=1e-6)
-    distance = np.median(np.linalg.norm(np.array(around), axis=1))
-    assert 1 / box[0, 0] == pytest.approx(0.8 * distance * 20 / 50)
+    assert 1 / box[0, 0] == pytest.approx(0.8 * np.median(np.linalg.norm(around, axis=1)) * 20 / 50)
     with pytest.raises(ValueError, match="all 4 cameras stand at one place"):
         box_of_views(poses[[0] * 4], np.full((4, 4), 50.0), np.full((4, 2), 40))
 
@@ -142,8 +141,7 @@ class TrueField:
     def render(self, rays_o, rays_d, n_first, n, jitter=False, hidden=None, coloured=True):
         origins, rays = rays_o.double().numpy() * self.scale + self.shift, rays_d.double().numpy()
         if hidden is not None:
-            middle = (CENTRE - self.shift) / self.scale
-            assert hidden(torch.from_numpy(middle).float())
+            assert hidden(torch.from_numpy((CENTRE - self.shift) / self.scale).float())
         colour, t, _ = ball_on_floor(origins, rays, RADIUS if hidden is None else 0.0)
         weights = torch.zeros(len(rays), n)
         weights[:, 0] = 1
@@ -169,8 +167,7 @@ class TestReading:
             write_image(tmp_path / "found" / name, small)
         photos = load_dataset(tmp_path / "data", reading=Reading("all", separated=tmp_path / "found"))
         assert photos.masked
-        agree = (photos.images[..., 3] > 0.5) == np.stack(masks)
-        assert agree.mean() > 0.98
+        assert ((photos.images[..., 3] > 0.5) == np.stack(masks)).mean() > 0.98
 
 
 def test_specks_beside_the_object_go():

@@ -410,8 +410,7 @@ class Refinement:
                     f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
                 )
         limits = torch.tensor(STEP_LIMITS)
-        if self.similar is None:
-            self.similar = SimilarTexels(self.equations.start, self.texels.positions, s.seed)
+        self.similar = self.similar or SimilarTexels(self.equations.start, self.texels.positions, s.seed)
         like = self.similar.usual_gloss(self.unknowns)
         wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
         step = wanted - self.unknowns

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import torch
 from scipy.cluster.vq import kmeans2, vq
@@ -17,35 +15,6 @@ N_SEEN = 20000  # texels by which kinds and medians are found
 REACH = 0.15  # deviation of the colours that count as one
 NEAR = 0.08  # deviation of the places that count as one, as a share of the asset's extent
 METAL = 0.5  # the usual metallic from which on a kind of texels is metal
-
-
-class Kinds(NamedTuple):
-    """Texels of similar features, which are of one kind.
-
-    Attributes:
-        seen: [k] the numbers of the texels by which medians are found.
-        weights: [kinds, k] the weights with which these count for each kind: Gaussians of their distances from its centre. They
-            are not weighted by certainty: glossy texels would decide for all.
-        label: [m] the kind of each texel.
-    """
-
-    seen: np.ndarray
-    weights: np.ndarray
-    label: np.ndarray
-
-    @classmethod
-    def of(cls, features: np.ndarray, most: int, random: np.random.Generator) -> Kinds:
-        """The kinds, `most` at most, of texels with features [m, d], in units of the Gaussian's deviation."""
-        seen = random.permutation(len(features))[:N_SEEN]
-        apart = random.normal(scale=0.01, size=(len(seen), features.shape[1]))  # equal texels make no clusters
-        centres, _ = kmeans2(features[seen] + apart, min(most, len(seen)), minit="++", seed=random)
-        squared = cdist(centres, features[seen], "sqeuclidean")
-        weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
-        return cls(seen, weights, vq(features, centres)[0])
-
-    def usual(self, values: Tensor) -> Tensor:
-        """[m] the usual one of values [m] of each texel's kind, a weighted median."""
-        return torch.from_numpy(weighted_medians(values.numpy()[self.seen], self.weights)[self.label])
 
 
 class SimilarTexels:
@@ -67,20 +36,33 @@ class SimilarTexels:
         near = NEAR * max(float(np.ptp(positions, axis=0).max()), 1e-12)
         colours = start[:, :3].double().numpy() / REACH
         placed = np.hstack([colours, (positions - positions.mean(axis=0)) / near])
-        self._of_colour = Kinds.of(colours, N_COLOURS, random)
-        self._metallic = Kinds.of(placed, N_KINDS, random).usual(start[:, METALLIC])
+        self._of_colour = kinds(colours, N_COLOURS, random)
+        self._metallic = usual(start[:, METALLIC], *kinds(placed, N_KINDS, random))
 
     def usual_gloss(self, unknowns: Tensor) -> Tensor:
-        """The usual roughness and metallic of texels similar to each one: [m, n], NaN where there is no such value.
-
-        Args:
-            unknowns: [m, n] as they are now.
-        """
+        """The usual roughness and metallic of texels similar to each one, whose unknowns [m, n] are given as they are now: [m, n],
+        NaN where there is no such value."""
         result = torch.full_like(unknowns, torch.nan)
-        result[:, ROUGHNESS] = self._of_colour.usual(unknowns[:, ROUGHNESS])
+        result[:, ROUGHNESS] = usual(unknowns[:, ROUGHNESS], *self._of_colour)
         islands = (self._metallic >= METAL) & (unknowns[:, METALLIC] < self._metallic)
         result[:, METALLIC] = torch.where(islands, self._metallic, torch.nan)
         return result
+
+
+def kinds(features: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """At most so many kinds of texels with similar features [m, d], which are in units of a Gaussian's deviation: the numbers [k] of
+    texels by which medians are found, their weights [kinds, k] by the Gaussian around each kind's centre, and the kind [m] of each texel.
+    Texels are not weighted by certainty: glossy ones would decide for all."""
+    seen = random.permutation(len(features))[:N_SEEN]
+    apart = random.normal(scale=0.01, size=(len(seen), features.shape[1]))  # equal texels make no clusters
+    centres, _ = kmeans2(features[seen] + apart, min(most, len(seen)), minit="++", seed=random)
+    squared = cdist(centres, features[seen], "sqeuclidean")
+    return seen, np.exp((squared.min(1, keepdims=True) - squared) / 2), vq(features, centres)[0]
+
+
+def usual(values: Tensor, seen: np.ndarray, weights: np.ndarray, label: np.ndarray) -> Tensor:
+    """[m] the usual one, a weighted median, of values [m] among the texels of each one's kind, see :func:`kinds`."""
+    return torch.from_numpy(weighted_medians(values.numpy()[seen], weights)[label])
 
 
 def weighted_medians(values: np.ndarray, weights: np.ndarray) -> np.ndarray:

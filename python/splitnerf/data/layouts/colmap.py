@@ -26,12 +26,8 @@ from splitnerf.data.lens import MODELS, PARAMETERS, read_lens
 from splitnerf.errors import InputError, note_once
 
 PLACES = ("sparse", "colmap/sparse")
-FORMS = (
-    ("bin", "bin"),
-    ("txt", "txt"),
-    ("txt", "bin"),
-    ("bin", "txt"),
-)  # of cameras and images; binary files have all digits
+# of the files of cameras and images; binary files have all digits
+FORMS = ("bin", "bin"), ("txt", "txt"), ("txt", "bin"), ("bin", "txt")
 IMAGES, MASKS = "images", "masks"
 POINT_BYTES = 24  # of an image point: x, y and the number of its 3D point
 LONGEST_NAME = 4096  # bytes
