@@ -211,7 +211,8 @@ def refined(painted):
 
 def test_a_balls_albedo_is_found_and_its_roughness_approached(painted, refined):
     asset, (wrong, result) = painted[0], refined
-    assets = (("true", asset), ("wrong", wrong), ("found", result.asset))
+    with_normals = replace(result.asset.materials[0], normal_texture=asset.materials[0].normal_texture)
+    assets = (("true", asset), ("wrong", wrong), ("found", replace(result.asset, materials=[with_normals])))
     values, sweeps = {name: AssetTexels(a).start for name, a in assets}, result.sweeps
     height = heights(AssetTexels(asset))[:, 0].abs()
     seen = (height > 0.1) & (height < 0.8)
