@@ -68,21 +68,5 @@ TEST(Parallel, NoMoreUnevenWorkIsTakenAfterAnExceptionWhichKeepsItsType) {
   set_parallel_backend(nullptr);
 }
 
-TEST(Parallel, BackendCanBeReplacedAndRestored) {
-  static int calls;
-  calls = 0;
-  set_parallel_backend([](int64_t n, int64_t, RangeBody body, void* context) {
-    ++calls;
-    body(0, n, context);
-  });
-  std::atomic<int64_t> total{0};
-  parallel_for(100, 1, [&](int64_t begin, int64_t end) { total += end - begin; });
-  set_parallel_backend(nullptr);
-  EXPECT_EQ(calls, 1);
-  parallel_for(100, 1, [&](int64_t begin, int64_t end) { total += end - begin; });
-  EXPECT_EQ(calls, 1);
-  EXPECT_EQ(total, 200);
-}
-
 }  // namespace
 }  // namespace splitnerf

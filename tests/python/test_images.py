@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from blender_data import directions_of_map, write_exr
 from PIL import Image
-from splitnerf import _core
 from splitnerf.data import images
 from splitnerf.data.environment import read_environment, rotate_environment, sample_environment
 from splitnerf.data.images import write_image
@@ -68,14 +67,6 @@ def test_photos_are_averaged_to_a_step_of_16_bits(dtype, factor):
     )
     assert np.array_equal(weighed[..., 3], alike[..., 3]) and weighed[0, 0].tolist() == [0] * 4
     assert averaged_codes(codes, 1) is codes
-
-
-def test_a_photo_that_cannot_be_averaged_is_refused():
-    for factor in (0, 5, -1):
-        with pytest.raises(ValueError, match="factor must be from 1"):
-            _core.average_photo(np.zeros((4, 9, 4), np.uint8), factor, True)
-    with pytest.raises(ValueError, match="codes must be"):
-        _core.average_photo(np.zeros((4, 9, 3), np.uint8), 2, True)
 
 
 def test_write_rejects_what_it_cannot_store(tmp_path):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from splitnerf import _core
 from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
 from splitnerf.export.simplify import (
@@ -99,17 +98,6 @@ def test_no_surface_raises():
         extract_mesh(lambda x: torch.ones(len(x)), 1.5, 16)
     with pytest.raises(RuntimeError, match="not finite"):
         extract_mesh(lambda x: torch.full((len(x),), float("nan")), 1.5, 16)
-
-
-def test_core_refuses_what_does_not_fit():
-    values, index = np.ones((2, 4, 4, 4), np.float32), np.full((3, 3, 3), -1, np.int32)
-    with pytest.raises(ValueError, match="each block of values once"):
-        _core.marching_cubes(values, index, 0.0, 1.0)
-    index[1, 1, 1] = 5
-    with pytest.raises(ValueError, match="index holds 5, values have 2 blocks"):
-        _core.blocks_to_open(values, index)
-    with pytest.raises(ValueError, match="must be"):
-        _core.marching_cubes(np.ones((2, 4, 4, 3), np.float32), index, 0.0, 1.0)
 
 
 def test_small_components_go_and_are_counted():

@@ -32,11 +32,9 @@ from op_cases import (
 )
 from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
 from splitnerf import _core
-from splitnerf.ops import linear_to_srgb
 from splitnerf.ops.training import quadratic_entropy
 from splitnerf_tools.doctor import cases
 from torch.autograd import forward_ad
-from torch.utils.checkpoint import checkpoint
 
 # The positions of the inputs to which there is a gradient.
 DIFFERENTIABLE = {
@@ -290,15 +288,6 @@ def test_a_tangent_raises(name):
         inputs[i] = forward_ad.make_dual(inputs[i], torch.ones_like(inputs[i]))
         with pytest.raises(RuntimeError, match="no forward derivative"):
             getattr(lib, name)(*inputs)
-
-
-def test_activations_may_be_computed_again():
-    """What torch's checkpointing does in the backward pass."""
-    x = torch.rand(5, requires_grad=True)
-    again = checkpoint(lambda y: linear_to_srgb(torch.sin(y) * 0.5 + 0.2), x, use_reentrant=False)
-    (gradient,) = torch.autograd.grad(again.sum(), x)
-    (expected,) = torch.autograd.grad(linear_to_srgb(torch.sin(x) * 0.5 + 0.2).sum(), x)
-    assert torch.equal(gradient, expected)
 
 
 def test_compilation_in_a_new_process():

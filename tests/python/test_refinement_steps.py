@@ -4,16 +4,12 @@ import numpy as np
 import pytest
 import torch
 from painted_ball import sky
-from splitnerf import _core
 from splitnerf.data.environment import sample_environment
-from splitnerf.ops.shading import monte_carlo_light
-from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
 from splitnerf.refinement.similar_texels import SimilarTexels, weighted_medians
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
-from stability.cases import drawn_directions
 
 
 def chain(**weights: float) -> Prior:
@@ -266,51 +262,6 @@ def test_the_lights_curvature_is_that_of_the_errors():
     way = (found / start).log()[2:-2]
     asked = (truth / start).log()[2:-2]
     assert 0.7 < (way * asked).sum() / asked.square().sum() < 1.05
-
-
-def test_white_integrals_are_those_of_many_directions():
-    """Values and derivatives by normal and roughness, against sums over 65,536 directions of the sphere in float64."""
-    normals = torch.nn.functional.normalize(
-        torch.tensor([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [-0.6, 0.2, 0.7]]).double(), dim=1
-    )
-    view = torch.nn.functional.normalize(torch.tensor([[0.5, 0.2, 1.0]]).double(), dim=1).expand(3, 3).contiguous()
-    point = normals.requires_grad_(True), torch.tensor([[0.3], [0.6], [0.9]]).double().requires_grad_(True)
-    tilt = (view - normals * (normals * view).sum(1, keepdim=True)).detach()  # a normal keeps its length
-    everywhere = torch.from_numpy(_core.fibonacci_sphere(1 << 16)).expand(3, -1, 3).contiguous()
-    density = torch.full(everywhere.shape[:2], 1 / (4 * np.pi)).double()
-    many = monte_carlo_light(point[0], view, point[1], everywhere, density, torch.ones_like(everywhere))
-    table = white_sums(*(x.float() for x in (point[0], view, point[1])))
-    for exact, found in zip(many, table):
-        torch.testing.assert_close(found[:, 0].double(), exact[:, 0], rtol=0.01, atol=0.002)
-        if not found.requires_grad:
-            continue
-        slopes = [torch.autograd.grad(x[:, 0].sum(), point, retain_graph=True) for x in (exact, found)]
-        along = [torch.cat([(s[0] * tilt).sum(1), s[1][:, 0]]) for s in slopes]
-        torch.testing.assert_close(along[1], along[0], rtol=0.1, atol=0.02)
-
-
-def test_centred_derivatives_say_the_same_with_less_noise():
-    """The light grows along x; its integral over a lobe follows the normal's x, whatever directions are drawn."""
-    n, k = 400, 12
-    normals = torch.tensor([0.0, 0.0, 1.0]).expand(n, 3).contiguous().requires_grad_(True)
-    view = torch.nn.functional.normalize(torch.tensor([[0.5, 0.2, 1.0]]), dim=1).expand(n, 3).contiguous()
-    roughness = torch.full((n, 1), 0.4).requires_grad_(True)
-    directions, pdf = drawn_directions(normals.detach(), view, roughness.detach(), 0.8, k, 3)
-    light = (1.0 + 0.3 * directions[..., :1]).expand(-1, -1, 3)
-    drawn = (normals, view, roughness, directions, pdf)
-    plain, of_one = monte_carlo_light(*drawn, light), monte_carlo_light(*drawn, torch.ones_like(light))
-    white = white_sums(normals, view, roughness)
-    calm, still = centred(plain, of_one, white), centred(of_one, of_one, white)
-    slopes = ("specular", normals), ("diffuse", normals), ("specular", roughness), ("dielectric", roughness)
-    for name, unknown in slopes:
-        torch.testing.assert_close(getattr(calm, name), getattr(plain, name), rtol=0, atol=0)
-        of_plain, of_calm, of_still = (
-            torch.autograd.grad(getattr(sums, name)[:, 0].sum(), unknown, retain_graph=True)[0][:, 0]
-            for sums in (plain, calm, still)
-        )
-        assert of_still.std() < 1e-4  # a white light makes no noise
-        assert of_calm.std() < 0.5 * of_plain.std()
-        assert abs(of_calm.mean() - of_plain.mean()) < 4 * of_plain.std() / n**0.5
 
 
 def test_the_light_moves_to_what_photos_show():

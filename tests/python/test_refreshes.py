@@ -299,14 +299,6 @@ def test_parameters_are_checked_before_a_mesh_and_before_they_are_saved(data, tm
     assert not (tmp_path / "checkpoint.pt").exists()
 
 
-@pytest.mark.parametrize("on", [False, True])
-def test_a_run_repeats_its_bits_as_it_is_set(data, tmp_path, monkeypatch, on):
-    order = calls(monkeypatch, loop.Training, "advance", lambda *_: torch.are_deterministic_algorithms_enabled())
-    config = tiny(steps=2, deterministic=on, **PLAIN)
-    train_scene(load_dataset(data), config, tmp_path)
-    assert order == [on, on]
-
-
 def test_bits_repeat_on_the_cpu_alone(data, tmp_path):
     """Others are refused before anything is made."""
     check_repeatable(tiny(deterministic=True), "cpu")

@@ -34,7 +34,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="DATA",
         help="the data that RUN was trained on (default, with options that need them: where they were); once, or once for each RUN",
     )
-    add("--downscale", type=int, metavar="N", help="average images down by N (default: as in training)")
+    add(
+        "--downscale",
+        type=int,
+        metavar="N",
+        help="average images down by N (default: as in training; 1 for a file outside a run's own folder)",
+    )
     add_reading_options(parser, "as in training")
     add("--spp", type=int, default=128, metavar="N", help="paths a pixel of what is path traced (default: 128)")
     add("--views", type=int, metavar="N", help="test views, evenly spread (default: all; 20 with --lights)")

@@ -15,7 +15,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "export",
         help="write a run's textured mesh and light",
-        description="Writes what RUN delivers or, with a size, what it trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
+        description="Writes what RUN delivers into --out or, without --out or with a size, what it trained, before its refinement: mesh.glb (watertight where the object is, decimated, "
         "UV-unwrapped, with albedo, occlusion-roughness-metallic and normal textures), mesh.ply (full resolution, vertex "
         "colours), environment.exr and environment.hdr. Components with less than 1 % of the largest one's faces and "
         "the walls of cavities are dropped; what no photo shows is a cap between its edges.",

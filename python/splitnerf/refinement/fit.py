@@ -28,7 +28,6 @@ from splitnerf.errors import InputError
 from splitnerf.ops import MeshScene
 from splitnerf.ops.shading import monte_carlo_light, shade_sums
 from splitnerf.ops.visibility import TexturedSurface, incoming_light
-from splitnerf.refinement.control_variate import centred, white_sums
 from splitnerf.refinement.lamps import CompactLamp, compact_lamp, power_of
 from splitnerf.refinement.level import at_level, level_of_light, rest_level, tint_of_light
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
@@ -62,7 +61,7 @@ BOUNCES = 3  # scattering events of interreflection
 KEEP = 0.9  # share of the observations that is kept after a sweep
 # Weights of the prior; three numbers are those of albedo, gloss and normal.
 SMOOTH = 1.0, 2.0, 1.0  # differences of neighbours' steps where a texel is as wide as a pixel; finer texels: more
-FLAT = 0.0, 5.0, 2.0  # differences of neighbours' values; edges cost little
+FLAT = 0.0, 0.5, 2.0  # differences of neighbours' values; edges cost little
 LIKE_ROUGHNESS = 0.5  # difference of a texel's roughness from the usual one of its colour
 LIKE_METAL = 2.0  # of its metallic from the usual one of its colour and place, where that is metal
 ANCHOR = 0.02  # distance from the start
@@ -164,6 +163,7 @@ class Refinement:
     Attributes:
         patch_width: See :func:`splitnerf.refinement.texels.patch_width`.
         tint: [3] See :func:`splitnerf.refinement.level.tint_of_light`; 1 where photos show what else shines on the object.
+        is_like: Whether colours are held at their usual roughness, see :class:`splitnerf.refinement.similar_texels.SimilarTexels`.
         sightings: How many pixels of all photos there are for each pixel's width squared of the surface, on average.
     """
 
@@ -215,7 +215,7 @@ class Refinement:
         self.light = EnvironmentLight(light * self.level)
         self.light_equations = LightEquations(self.light, surroundings=self.seen)
         self.unknowns = to_unknowns(self.texels.start)
-        self.equations, self.similar = NormalEquations(self.unknowns, self.prior, KEEP), None
+        self.equations, self.similar, self.is_like = NormalEquations(self.unknowns, self.prior, KEEP), None, True
 
     def find_level(self, held: np.ndarray) -> np.ndarray:
         """Begins with a brighter light where the texels tell of one and the photos held out, whose errors [n] are given, are
@@ -253,6 +253,7 @@ class Refinement:
             "random": self.random.bit_generator.state,
             "n_batches": self.n_batches,
             "n_sweeps": self.n_sweeps,
+            "is_like": self.is_like,
         }
 
     def restore(self, state: dict[str, object]) -> None:
@@ -272,6 +273,7 @@ class Refinement:
         self.light.levels = list(state["light"])
         self.random.bit_generator.state = state["random"]
         self.n_batches, self.n_sweeps = (int(state[name]) for name in ("n_batches", "n_sweeps"))
+        self.is_like = bool(state["is_like"])
 
     def maps(self) -> tuple[Tensor, Tensor, Tensor]:
         """The textures as they are now: albedo [h, w, 3], roughness and metallic [h, w, 2], normals [h, w, 3]."""
@@ -329,9 +331,7 @@ class Refinement:
         texels, shares = footprints(self.light.height, towards.reshape(-1, 3))
         sky = read(light.view(-1, 3), texels, shares).view_as(arriving.directions)
         radiance = (sky * arriving.visible[..., None] + arriving.sent).requires_grad_(True)
-        drawn = (m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf)
-        white = white_sums(m.normals, samples.view_dirs, m.roughness)
-        sums = centred(monte_carlo_light(*drawn, radiance), monte_carlo_light(*drawn, torch.ones_like(sky)), white)
+        sums = monte_carlo_light(m.normals, samples.view_dirs, m.roughness, arriving.directions, arriving.pdf, radiance)
         material = {"albedo": m.albedo, "roughness": m.roughness, "metallic": m.metallic}
         colours = shade_sums(m.normals, samples.view_dirs, **material, sums=sums, compensate=True)
         return Shaded(colours, radiance, arriving.visible, texels, shares, sky)
@@ -384,8 +384,9 @@ class Refinement:
         s = self.settings
         return max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
 
-    def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> float:
-        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error before it.
+    def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> tuple[float, np.ndarray]:
+        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error before it, and those of held-out pixels
+        after it, see :meth:`held_errors`.
 
         Args:
             seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last
@@ -401,28 +402,41 @@ class Refinement:
             errors.append(self.gather(surface))
             report()
         gathered, error = time.monotonic(), float(np.mean(errors))
-        if not np.isfinite(error):
-            raise RuntimeError(f"refinement: the error of the photos is {error}; nothing was written")
+        self._check("the error of the photos", error)
         if s.light_step > 0:
             moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
-            if not np.isfinite(moved):
-                raise RuntimeError(
-                    f"refinement: the light after {self.n_batches} batches is not finite; nothing was written"
-                )
-        limits = torch.tensor(STEP_LIMITS)
+            self._check("the light", moved)
         self.similar = self.similar or SimilarTexels(self.equations.start, self.texels.positions, s.seed)
-        like = self.similar.usual_gloss(self.unknowns)
-        wanted = into_range(self.unknowns + self.equations.step(self.unknowns, like).clamp(-limits, limits))
-        step = wanted - self.unknowns
-        if not bool(torch.isfinite(step).all()):
-            raise RuntimeError(
-                f"refinement: the step after {self.n_batches} batches is not finite; nothing was written"
-            )
-        self.unknowns = wanted
+        held = self.take_step()
         self.n_sweeps += 1
-        self.equations.move(step)
         self.step_seconds = time.monotonic() - gathered
-        return error
+        return error, held
+
+    def take_step(self) -> np.ndarray:
+        """Moves the texels; returns the errors of held-out pixels then. Colours pull at the roughness of their texels until one of the sweeps
+        1, 2, 4, 8, ... leaves these pixels clearly better explained without."""
+        before, like = self.unknowns, self.similar.usual_gloss(self.unknowns)
+        free = like.clone()
+        free[:, ROUGHNESS] = torch.nan
+        steps = [self.after_step(before, like if self.is_like else free)]
+        if self.is_like and self.n_sweeps.bit_count() < 2:
+            steps.append(self.after_step(before, free))
+            self.is_like = not is_worse(steps[0][1], steps[1][1])
+        self.unknowns, held = steps[0] if self.is_like else steps[-1]
+        self.equations.move(self.unknowns - before)
+        return held
+
+    def after_step(self, before: Tensor, like: Tensor) -> tuple[Tensor, np.ndarray]:
+        """The unknowns after a step from those before, `like` as of :meth:`NormalEquations.step`, and the errors of held-out pixels."""
+        limits = torch.tensor(STEP_LIMITS)
+        self.unknowns = into_range(before + self.equations.step(before, like).clamp(-limits, limits))
+        self._check("a texel", float(self.unknowns.abs().max()))  # NaN is passed on
+        return self.unknowns, self.held_errors()
+
+    def _check(self, name: str, value: float) -> None:
+        """Raises RuntimeError where a number is not finite."""
+        if not math.isfinite(value):
+            raise RuntimeError(f"refinement: {name} after {self.n_batches} batches is {value}; nothing was written")
 
 
 class Draws:

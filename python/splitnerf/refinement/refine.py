@@ -29,7 +29,7 @@ from splitnerf.refinement.stage import Refined, Stage, decibels
 from splitnerf.refinement.texels import check_form
 
 TRAINED = "trained"  # the folder in a run of what training alone exported
-STATE, STATE_FORMAT = "refinement.pt", 8
+STATE, STATE_FORMAT = "refinement.pt", 9
 RECORD = "refinement.json"
 OCCLUSION_OFFSET = 0.006  # distance of a ray's start from the mesh, as a share of its extent
 HEIGHTS = 256, 128, 64, 32, 16, 8  # rows that the light may have while it is fitted

@@ -135,7 +135,6 @@ class Stage:
         self.albedo_size = detail_size(dataset, asset, settings.albedo_size)
         self.started, self.last_seconds = time.monotonic(), 0.0  # of the last sweep made here
         self.best: Candidate | None = None
-        self.held_seconds = 0.0  # that the last look at held-out pixels took
         if state is not None:
             check_tensor("vertices", state["vertices"], asset.vertices.shape, torch.float32)
             asset = replace(asset, vertices=state["vertices"].numpy())
@@ -223,12 +222,10 @@ class Stage:
         seconds = self.limit / LEAST_SWEEPS
         if self.sweeps:
             seconds = min(seconds, self.limit - started)
-        seconds -= self.held_seconds
         message = self.message(len(self.sweeps) + 1)
-        error = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
-        number, fitted = len(self.sweeps) + 1, self.seconds
-        self.last = self._candidate(number, self.fit.held_errors())
-        self.held_seconds = self.seconds - fitted
+        error, held = self.fit.sweep(seconds, lambda: self.show(min(0.99, self.progress), message))
+        number = len(self.sweeps) + 1
+        self.last = self._candidate(number, held)
         held = float(np.mean(self.last.held))
         if held < np.mean(self.best.held):
             self.best = self.last

@@ -19,7 +19,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         "synth",
         help="render a dataset with full truth from a GLB file or a built-in shape",
         description="Renders ASSET or a built-in shape, brought to the unit sphere, from cameras around it under the light MAP, "
-        "with true albedo, roughness, metallic, normals and relit views, in a layout that train and evaluate read.",
+        "with true albedo and normals (layout blender: roughness and metallic, too) and, with --relight, relit views.",
         epilog=examples(
             "splitnerf synth chair.glb --light studio.hdr --out data",
             "splitnerf synth chair.glb --light studio.hdr --relight field.hdr city.hdr --size 400 --out data",

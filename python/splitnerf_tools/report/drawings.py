@@ -11,20 +11,7 @@ from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 460, 250
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 12, 34
-PALETTE = (
-    "#3b82c4",
-    "#d9822b",
-    "#3f9d63",
-    "#b5539a",
-    "#8a7ad1",
-    "#c2524a",
-    "#2c9c9c",
-    "#98863a",
-    "#8d9298",
-    "#6aa84f",
-    "#d46a9f",
-    "#5c6bc0",
-)
+PALETTE = "#3b82c4 #d9822b #3f9d63 #b5539a #8a7ad1 #c2524a #2c9c9c #98863a #8d9298 #6aa84f #d46a9f #5c6bc0".split()
 MAX_POINTS = 400
 SIDE = 400  # of a plan, in its own units
 AHEAD = 0.04  # length of the line that shows where a camera looks, in the plan's edge
