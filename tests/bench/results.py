@@ -6,7 +6,6 @@
     scenes    objects with full truth, 30 minutes each
     kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
     time      error against time: half a minute to 30 minutes, two objects, two seeds
-    skips     training with and without what a step leaves out, by equal time and by equal steps
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
     ablation  what each part of the method is worth behind the refinement, by equal steps (splitnerf ablate); hours
 
@@ -60,31 +59,15 @@ SCORES = {  # column: the evaluation's keys, digits
     "light, dB": (("light_psnr",), 1),
     "F-score": (("f_score",), 3),
     "steps": (("training", "step"), 0),
-    "training, s": (("training", "seconds"), 0),
 }
-SKIPS: dict[str, dict[str, float]] = {  # what a step leaves out, by the settings without it
-    "hash levels finer than 0.65 pixels": {"surface.least_cell": 0},
-    "space outside the hull, at first": {"hull_until": 0},
-    "faint samples": {"sampling.min_weight": 0},
-    "shading of most samples": {"shades_per_ray": 0},
-    "three of four steps of the light": {"light_step_every": 1},
-}
-ALONE = "--set", "refinement.enabled=false"  # training without what comes after it
 SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     "cpu": (),
     "paper": (
-        *("--preset", "paper", "--set", "target_samples=4096", "--set", "light_samples=2048"),
+        *("--preset", "paper", "--steps", 20000, "--set", "target_samples=4096", "--set", "light_samples=2048"),
         *("--set", "light_queries=2048", "--set", "mesh.resolution=192", "--set", "run.preview_every=1"),
     ),
-    "all skips": ALONE,
-    **{
-        f"without: {name}": ALONE + tuple(word for key, value in off.items() for word in ("--set", f"{key}={value}"))
-        for name, off in (
-            SKIPS | {"all of these": {key: value for off in SKIPS.values() for key, value in off.items()}}
-        ).items()
-    },
 }
-STEPS_TAKE = {"paper": 300}  # minutes of the runs that steps end, on two cores; others: 2
+STEPS_TAKE = {"paper": 300}  # minutes of the runs that steps end, on two cores
 ABLATED = "boombox", "corset"
 MOST_LINES = 9  # of a page's table; a longer one lists what runs deliver, and its CSV file has the rest
 ABLATION = (
@@ -110,7 +93,7 @@ Row = dict[str, str]
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, what it holds, and its runs: settings and minutes, 0 for as long as `steps` take."""
+    """A page: its title, what it holds, and its runs: settings and minutes, 0 for as long as the steps take."""
 
     title: str
     scenes: tuple[str, ...]
@@ -118,7 +101,6 @@ class Page:
     size: int
     seeds: int = 1
     pictures: bool = False
-    steps: int = 0
 
 
 PAGES = {
@@ -129,20 +111,11 @@ PAGES = {
         "Objects", ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket"), (("cpu", 30),), 200
     ),
     "kinds": Page("Unseen kinds", tuple(KINDS), (("cpu", 8),), 100, pictures=True),
-    "time": Page("Error against time", ("boombox", "knot"), tuple(("cpu", m) for m in (0.5, 1, 2, 4, 8, 30)), 200, 2),
-    "skips": Page(
-        "Training with and without its skips",
-        ("boombox", "knot"),
-        tuple((name, m) for m in (1, 0) for name in SETTINGS if "skips" in name or "without" in name),
-        200,
-        steps=2000,
+    "time": Page(
+        "Error against time", ("boombox", "knot"), tuple(("cpu", m) for m in (0.5, 1, 2, 4, 8, 15, 30)), 200, 2
     ),
     "paper": Page(
-        "The published method, 1/64 of the samples, all steps",
-        ("boombox",),
-        (("cpu", 30), ("paper", 0)),
-        200,
-        steps=20000,
+        "The published method, 1/64 of the samples, all steps", ("boombox",), (("cpu", 30), ("paper", 0)), 200
     ),
 }
 NAMES = *PAGES, "ablation"
@@ -209,11 +182,9 @@ def rows_of(
     if (data := data_of(scene, page.size, work)) is None:
         print(f"{scene}: no data, left out", file=sys.stderr)
         return []
-    run = work / f"runs/{'_'.join(f'{scene} {settings}'.split())}_{minutes:g}_{seed}"
+    run = work / f"runs/{scene.replace(' ', '_')}_{settings}_{minutes:g}_{seed}"
     facts = provenance(SOURCES)  # before, as the sources may change meanwhile
-    limits = ("--max-minutes", minutes, "--overwrite")
-    if not minutes:  # this may take hours
-        limits = "--steps", page.steps, "--resume", "auto"
+    limits = ("--max-minutes", minutes, "--overwrite") if minutes else ("--resume", "auto")  # the latter takes hours
     if not splitnerf("train", data, "--out", run, *SETTINGS[settings], *limits, "--seed", seed):
         return []
     rows, files = [], {"trained": source_of(run) / "mesh.glb", "refined": run}
@@ -275,8 +246,7 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
     always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
     shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]
-    listed = [row for row in rows if row["asset"] == "refined"]
-    listed = listed if listed and len(rows) > MOST_LINES else rows
+    listed = rows if len(rows) <= MOST_LINES else [row for row in rows if row["asset"] == "refined"]
     lines = [f"# {page.title}", "", header(facts), ""]
     if name == "time":
         draw(out / f"{name}.png", rows)
@@ -292,7 +262,7 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         "",
         "| " + " | ".join(shown) + " |",
         "|" + " --- |" * len(shown),
-        *("| " + " | ".join(cell(row, column, page) for column in shown) + " |" for row in listed),
+        *("| " + " | ".join(cell(row, column) for column in shown) + " |" for row in listed),
         "",
         *means(rows),
     ]
@@ -330,9 +300,9 @@ def place(row: Row, page: Page) -> tuple:
     return at, float(row["minutes"]), row["seed"], row["asset"] == "refined"
 
 
-def cell(row: Row, column: str, page: Page) -> str:
+def cell(row: Row, column: str) -> str:
     """The text of a row's column."""
-    return f"{page.steps} steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
+    return "all steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
 
 
 def means(rows: list[Row]) -> list[str]:
@@ -403,7 +373,7 @@ def main() -> int:
                     key = scene, settings, f"{minutes:g}", str(seed)
                     if not args.again and any(tuple(row[k] for k in KEYS[:4]) == key for row in rows):
                         continue
-                    taken = minutes or STEPS_TAKE.get(settings, 2)
+                    taken = minutes or STEPS_TAKE[settings]
                     total += taken
                     if args.list:
                         print(f"{name}: {scene}, {settings}, {taken:g} minutes, seed {seed}")

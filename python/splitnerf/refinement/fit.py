@@ -419,7 +419,7 @@ class Refinement:
         free = like.clone()
         free[:, ROUGHNESS] = torch.nan
         steps = [self.after_step(before, like if self.is_like else free)]
-        if self.is_like and self.n_sweeps.bit_count() < 2:
+        if self.is_like and (self.n_sweeps + 1).bit_count() == 1:
             steps.append(self.after_step(before, free))
             self.is_like = not is_worse(steps[0][1], steps[1][1])
         self.unknowns, held = steps[0] if self.is_like else steps[-1]
