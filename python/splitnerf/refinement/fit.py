@@ -163,7 +163,7 @@ class Refinement:
     Attributes:
         patch_width: See :func:`splitnerf.refinement.texels.patch_width`.
         tint: [3] See :func:`splitnerf.refinement.level.tint_of_light`; 1 where photos show what else shines on the object.
-        is_like: Whether colours are held at their usual roughness, see :class:`splitnerf.refinement.similar_texels.SimilarTexels`.
+        is_like: Whether texels are drawn to the usual roughness of their colour, see :class:`splitnerf.refinement.similar_texels.SimilarTexels`.
         sightings: How many pixels of all photos there are for each pixel's width squared of the surface, on average.
     """
 
@@ -413,8 +413,8 @@ class Refinement:
         return error, held
 
     def take_step(self) -> np.ndarray:
-        """Moves the texels; returns the errors of held-out pixels then. Colours pull at the roughness of their texels until one of the sweeps
-        1, 2, 4, 8, ... leaves these pixels clearly better explained without."""
+        """Moves the texels; returns the errors of held-out pixels then. Texels are drawn to the usual roughness of their colour until, in one of
+        the sweeps 1, 2, 4, 8, ..., a step without that explains these pixels clearly better."""
         before, like = self.unknowns, self.similar.usual_gloss(self.unknowns)
         free = like.clone()
         free[:, ROUGHNESS] = torch.nan
