@@ -5,13 +5,14 @@
     knot    a dark lacquered torus knot, engraved: a glossy dielectric that reflects itself
     rings   rings of metal and enamel, linked: strong interreflection
     basket  a wire lantern with a painted ball in it: thin parts
+    helm, casket: see armour.py
     brushed, wheel, porcelain, gilded, wires: see kinds.py
 
 Each becomes OUT/NAME.glb with one material and textures. Data sets are rendered from them with
 
     splitnerf synth OUT/knot.glb --light lebombo_1k.hdr --relight city.hdr sunset.hdr kloppenheim_05_1k.hdr --out DATA
 
-(rings under christmas_photo_studio_07_1k.hdr, basket under potsdamer_platz_1k.hdr). Every part is a closed surface:
+(rings and casket under christmas_photo_studio_07_1k.hdr, basket and helm under potsdamer_platz_1k.hdr). Every part is a closed surface:
 a tube about a curve, whose radius may shrink to 0 at both ends. Parts may stick into each other.
 """
 
@@ -24,6 +25,7 @@ import trimesh
 from splitnerf.export.writers import write_glb
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from bench.armour import ARMOUR  # noqa: E402
 from bench.kinds import KINDS  # noqa: E402
 from bench.tubes import TAU, Tube, assemble, band, lathe, mix, noise, ring, smooth, through, wire  # noqa: E402
 
@@ -150,7 +152,7 @@ def basket() -> list[Tube]:
     return [*tubes, Tube(*lathe(ball), majolica, (96, 128), 768)]
 
 
-SCENES = {"knot": knot, "rings": rings, "basket": basket, **KINDS}
+SCENES = {"knot": knot, "rings": rings, "basket": basket, **ARMOUR, **KINDS}
 
 
 def main() -> None:

@@ -81,6 +81,8 @@ HARD = {  # the light of the photos; three others relight it
     "knot": "lebombo_1k.hdr",
     "rings": "christmas_photo_studio_07_1k.hdr",
     "basket": "potsdamer_platz_1k.hdr",
+    "helm": "potsdamer_platz_1k.hdr",
+    "casket": "christmas_photo_studio_07_1k.hdr",
     "brushed": "blender_interior.exr",
     "wheel": "blender_courtyard.exr",
     "porcelain": "potsdamer_platz_1k.hdr",
@@ -108,7 +110,10 @@ PAGES = {
         "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (("cpu", 4),), 120
     ),
     "scenes": Page(
-        "Objects", ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket"), (("cpu", 30),), 200
+        "Objects",
+        ("boombox", "avocado", "corset", "teapot", "knot", "rings", "basket", "helm", "casket"),
+        (("cpu", 30),),
+        200,
     ),
     "kinds": Page("Unseen kinds", tuple(KINDS), (("cpu", 8),), 100, pictures=True),
     "time": Page(

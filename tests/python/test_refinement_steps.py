@@ -7,19 +7,19 @@ from painted_ball import sky
 from splitnerf.data.environment import sample_environment
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
-from splitnerf.refinement.normal_equations import APART, EDGE, METAL_APART, NormalEquations, Prior
+from splitnerf.refinement.normal_equations import APART, EDGE, NormalEquations, Prior
 from splitnerf.refinement.similar_texels import SimilarTexels, weighted_medians
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
 
 def chain(**weights: float) -> Prior:
     """A prior of texels 0 - 1 - 2, with one weight for all unknowns."""
-    of_all = {name: torch.full((N_UNKNOWNS,), weights.get(name, 0.0)) for name in ("smooth", "flat", "anchor", "like")}
-    frames = torch.eye(2).expand(2, 2, 2)
-    return Prior(pairs=torch.tensor([[0, 1], [1, 2]]), frames=frames, groups=GROUPS, **of_all)
+    of_all = {name: torch.full((N_UNKNOWNS,), weights.get(name, 0.0)) for name in ("smooth", "flat", "anchor")}
+    frames, like = torch.eye(2).expand(2, 2, 2), weights.get("like", 0.0)
+    return Prior(pairs=torch.tensor([[0, 1], [1, 2]]), frames=frames, groups=GROUPS, like=like, **of_all)
 
 
-def fitted(prior: Prior, observed: torch.Tensor, like: torch.Tensor, n_steps: int = 60) -> torch.Tensor:
+def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = None, n_steps: int = 60) -> torch.Tensor:
     """[m, n] where the steps end if each unknown of each texel was observed once, with one precision."""
     m = len(observed)
     equations, unknowns = NormalEquations(torch.zeros(m, N_UNKNOWNS), prior, 0.0), torch.zeros(m, N_UNKNOWNS)
@@ -31,7 +31,7 @@ def fitted(prior: Prior, observed: torch.Tensor, like: torch.Tensor, n_steps: in
             residual = torch.einsum("bcn,bn->bc", of_channel, unknowns - observed)
             texels = torch.arange(m)[:, None].expand(-1, 4)
             equations.add(texels, torch.full((m, 4), 0.25), of_channel, torch.ones(m, 3), residual)
-        step = equations.step(unknowns, like, 60)
+        step = equations.step(unknowns, usual, 60)
         unknowns = unknowns + step
         equations.move(step)
     return unknowns
@@ -44,7 +44,7 @@ def test_normals_across_a_seam_are_compared_in_one_frame():
     observed = torch.zeros(3, N_UNKNOWNS)
     observed[1:, 5:] = torch.tensor([0.3, -0.1])
     observed[0, 5:] = frame @ observed[1, 5:]
-    torch.testing.assert_close(fitted(prior, observed, observed), observed)
+    torch.testing.assert_close(fitted(prior, observed), observed)
     values, rows = torch.randn(3, N_UNKNOWNS), torch.randn(2, N_UNKNOWNS)
     torch.testing.assert_close(
         (prior.differences(values) * rows).sum(), (values * prior.differences_adjoint(rows, 3)).sum()
@@ -56,7 +56,7 @@ def test_small_differences_are_smoothed_and_edges_are_kept():
     observed = torch.zeros(3, N_UNKNOWNS)
     observed[:, 3] = torch.tensor([0.30, 0.32, 0.80])
     observed[:, 5:] = torch.tensor([[0.0, 0.0], [0.01, -0.01], [0.01, 0.4]])
-    found = fitted(chain(flat=1.0), observed, observed)
+    found = fitted(chain(flat=1.0), observed)
     at = found.clone().requires_grad_(True)
     apart = (at[1:] - at[:-1]).square()
     cost = 0.5 * (at - observed).square().sum()
@@ -68,89 +68,30 @@ def test_small_differences_are_smoothed_and_edges_are_kept():
     assert abs(found[2, 5] - found[1, 5]) < abs(found[1, 5] - found[0, 5])
 
 
-def test_similar_texels_pull_at_the_cost_that_is_written():
-    observed, like = torch.zeros(3, N_UNKNOWNS), torch.zeros(3, N_UNKNOWNS)
-    observed[:, 3], like[:, 3] = torch.tensor([0.3, 0.3, 0.9]), torch.tensor([0.3, 0.35, 0.3])
-    found = fitted(chain(like=0.5), observed, like)
-    at = found.clone().requires_grad_(True)
-    pull = 0.25 * APART**2 * torch.log1p(((at - like) / APART).square()).sum()
-    assert torch.autograd.grad(0.5 * (at - observed).square().sum() + pull, at)[0].abs().max() < 1e-4
+def test_a_usual_roughness_pulls_at_the_cost_that_is_written():
+    observed, usual = torch.zeros(3, N_UNKNOWNS), torch.tensor([0.3, 0.35, 0.3])
+    observed[:, 3:5] = torch.tensor([[0.3, 0.9], [0.3, 0.1], [0.9, 0.5]])
+    found = fitted(chain(like=0.5), observed, usual)
+    at = found[:, 3].clone().requires_grad_(True)
+    pull = 0.25 * APART**2 * torch.log1p(((at - usual) / APART).square()).sum()
+    assert torch.autograd.grad(0.5 * (at - observed[:, 3]).square().sum() + pull, at)[0].abs().max() < 1e-4
     assert found[0, 3] == pytest.approx(0.3, abs=1e-5) and 0.31 < found[1, 3] < 0.32  # a third of the way, nearly
     assert found[2, 3] > 0.83  # what differs much moves by a tenth of the way
+    torch.testing.assert_close(found[:, 4], observed[:, 4])
+    torch.testing.assert_close(fitted(chain(like=5.0), observed), observed)
 
 
-def test_like_metal_pulls_at_a_bounded_cost_that_lets_go_of_what_is_far():
-    observed, like = torch.zeros(3, N_UNKNOWNS), torch.full((3, N_UNKNOWNS), torch.nan)
-    observed[:, 4], like[:, 4] = torch.tensor([0.6, 0.3, 0.0]), torch.tensor([0.7, 0.7, 1.0])
-    found = fitted(chain(like=0.5), observed, like)[:, 4]
-    at = found.clone().requires_grad_(True)
-    squared = ((at - like[:, 4]) / METAL_APART).square()
-    pull = 0.25 * METAL_APART**2 * (squared / (1 + squared)).sum()
-    assert torch.autograd.grad(0.5 * (at - observed[:, 4]).square().sum() + pull, at)[0].abs().max() < 1e-4
-    assert found[0] > 0.63 and 0.31 < found[1] < 0.4 and found[2] < 0.02
-
-
-def one_place(unknowns: torch.Tensor) -> np.ndarray:
-    """Texels that are all in one place."""
-    return np.ones((len(unknowns), 3), np.float32)
-
-
-def two_colours(metallic: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """Random unknowns of red and blue texels, six of ten with one roughness and metallic per colour, and which are red."""
+def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
+    """Random unknowns of red and blue texels, six of ten with one roughness per colour."""
     unknowns = torch.rand(5000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
     red = torch.arange(5000) % 2 == 0
     unknowns[:, :3] = torch.where(red[:, None], torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.2, 0.8]))
     same = torch.arange(5000) % 10 < 6
     unknowns[same, 3] = torch.where(red[same], 0.1, 0.9)
-    unknowns[same, 4] = torch.where(red[same], metallic, 0.05)
-    return unknowns, red
-
-
-def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
-    unknowns, red = two_colours(metallic=0.2)
-    similar = SimilarTexels(unknowns, one_place(unknowns), 0)
+    similar = SimilarTexels(unknowns, 0)
     unknowns[:, :3] = 0.5  # what is similar was so at the start
-    found = similar.usual_gloss(unknowns)
-    torch.testing.assert_close(found[:, 3], torch.where(red, 0.1, 0.9))
-    assert found[:, [0, 1, 2, 4, 5, 6]].isnan().all()
-    assert torch.isfinite(SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[:, 3]).all()
-
-
-def test_a_colour_that_is_mostly_metal_draws_its_dielectrics_and_no_other_texel():
-    unknowns, red = two_colours(metallic=0.9)
-    drawn = red & (unknowns[:, 4] < 0.9)
-    found = SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[:, 4]
-    assert drawn.sum() > 500 and (found[drawn] == 0.9).all() and found[~drawn].isnan().all()
-
-
-def test_enamel_of_the_colour_of_gold_elsewhere_stays_enamel():
-    """A ring of gold with islands, beside a ring of enamel with bars of gold; all have one colour."""
-    unknowns, positions = torch.full((6000, N_UNKNOWNS), 0.5), np.random.default_rng(0).random((6000, 3)) * 0.3
-    of_gold, few = torch.arange(6000) < 4000, torch.arange(6000) % 5 == 0
-    unknowns[:, 4] = torch.where(of_gold ^ few, 0.9, 0.1)
-    positions[~of_gold.numpy()] += [0.7, 0, 0]
-    found = SimilarTexels(unknowns, positions, 0).usual_gloss(unknowns)[:, 4]
-    assert (found[of_gold & few] == 0.9).all() and found[~of_gold].isnan().all()
-    # the colour alone takes all
-    assert (SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[~of_gold & ~few, 4] == 0.9).all()
-
-
-def test_metal_does_not_spread_by_what_it_turned_into_metal():
-    """Enamel, of which most texels have become metal since the start."""
-    start = torch.full((3000, N_UNKNOWNS), 0.1)
-    now = start.clone()
-    now[torch.arange(3000) % 3 > 0, 4] = 0.9
-    assert SimilarTexels(start, one_place(now), 0).usual_gloss(now)[:, 4].isnan().all()
-    assert (SimilarTexels(now, one_place(now), 0).usual_gloss(now)[now[:, 4] < 0.5, 4] == 0.9).all()
-
-
-def test_where_nothing_is_usual_nothing_pulls_and_nothing_brakes():
-    observed = torch.zeros(3, N_UNKNOWNS)
-    observed[:, 3] = torch.tensor([0.3, 0.5, 0.9])
-    nothing = torch.full_like(observed, torch.nan)
-    steps = [fitted(chain(like=weight), observed, nothing, n_steps=1) for weight in (0.0, 5.0)]
-    torch.testing.assert_close(*steps)
-    assert steps[0].abs().max() > 0.5
+    torch.testing.assert_close(similar.usual_roughness(unknowns), torch.where(red, 0.1, 0.9))
+    assert torch.isfinite(SimilarTexels(unknowns, 0).usual_roughness(unknowns)).all()
 
 
 def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
@@ -160,7 +101,7 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
     unknowns[:, 3] = torch.where(few, 0.7, 0.2)
     for grey, roughness in ((0.50, 0.2), (0.1, 0.7)):
         unknowns[:, :3] = torch.where(few, grey, 0.55)[:, None]
-        assert (SimilarTexels(unknowns, one_place(unknowns), 0).usual_gloss(unknowns)[few, 3] == roughness).all()
+        assert (SimilarTexels(unknowns, 0).usual_roughness(unknowns)[few] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
     assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
 
@@ -178,11 +119,11 @@ def test_the_equations_find_what_linear_observations_say():
     weights = (torch.rand(240, 3, generator=generator) + 0.1).repeat_interleave(2, 0)
     residual = torch.einsum("bcn,bn->bc", jacobian, start[texels[:, 0]] - truth[texels[:, 0]])
     equations.add(texels, shares, jacobian, weights, residual)
-    step = equations.step(start, start, 100)
+    step = equations.step(start, None, 100)
     torch.testing.assert_close(start + step, truth, atol=1e-3, rtol=0)
     # what was seen is carried along: at the new place it asks for nothing more
     equations.move(step)
-    assert equations.step(start + step, start, 100).abs().max() < 1e-3
+    assert equations.step(start + step, None, 100).abs().max() < 1e-3
 
 
 def test_the_prior_takes_texels_along_that_no_photo_shows():
@@ -193,7 +134,7 @@ def test_the_prior_takes_texels_along_that_no_photo_shows():
     texels, shares = torch.zeros(6, 4, dtype=torch.int64), torch.full((6, 4), 0.25)
     equations.add(texels, shares, jacobian, torch.ones(6, 3), -torch.ones(6, 3))
     nothing = torch.zeros(4, N_UNKNOWNS)
-    step = equations.step(nothing, nothing, 200)
+    step = equations.step(nothing, None, 200)
     torch.testing.assert_close(step[:3], torch.ones(3, N_UNKNOWNS), atol=0.02, rtol=0)
     assert step[3].abs().max() < 1e-6
 

@@ -43,17 +43,7 @@ from splitnerf.refinement.texels import (
     patch_width,
     texels_per_pixel,
 )
-from splitnerf.refinement.unknowns import (
-    GROUPS,
-    METALLIC,
-    N_UNKNOWNS,
-    ROUGHNESS,
-    STEP_LIMITS,
-    into_range,
-    per_unknown,
-    to_unknowns,
-    to_values,
-)
+from splitnerf.refinement.unknowns import GROUPS, STEP_LIMITS, into_range, per_unknown, to_unknowns, to_values
 
 CLAMP_INDIRECT = 10.0
 MOST_GROUPS, GROUP_ROUNDS = 24, 10  # of photos whose lights have about one rotation; rounds of the search for them
@@ -63,7 +53,6 @@ KEEP = 0.9  # share of the observations that is kept after a sweep
 SMOOTH = 1.0, 2.0, 1.0  # differences of neighbours' steps where a texel is as wide as a pixel; finer texels: more
 FLAT = 0.0, 0.5, 2.0  # differences of neighbours' values; edges cost little
 LIKE_ROUGHNESS = 0.5  # difference of a texel's roughness from the usual one of its colour
-LIKE_METAL = 2.0  # of its metallic from the usual one of its colour and place, where that is metal
 ANCHOR = 0.02  # distance from the start
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
@@ -184,8 +173,6 @@ class Refinement:
         # fewer than eight pixels judge themselves
         self.held = Draws(np.flatnonzero(held), self.pixels.view, dataset.light_turns) if held.any() else self.fitted
         self.random = np.random.default_rng(s.seed)
-        like = torch.zeros(N_UNKNOWNS)
-        like[ROUGHNESS], like[METALLIC] = LIKE_ROUGHNESS, LIKE_METAL
         pixel = texels_per_pixel(dataset, asset)
         self.patch_width = patch_width(pixel)
         self.sightings = len(self.pixels) * pixel**2 / max(len(self.texels.index), 1)
@@ -197,7 +184,7 @@ class Refinement:
             flat=per_unknown(*FLAT),
             groups=GROUPS,
             anchor=per_unknown(*[ANCHOR] * 3),
-            like=like,
+            like=LIKE_ROUGHNESS,
         )
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
@@ -406,7 +393,7 @@ class Refinement:
         if s.light_step > 0:
             moved = self.light_equations.step(s.light_step / (1.0 + self.n_sweeps / SWEEPS_OF_LARGE_STEPS))
             self._check("the light", moved)
-        self.similar = self.similar or SimilarTexels(self.equations.start, self.texels.positions, s.seed)
+        self.similar = self.similar or SimilarTexels(self.equations.start, s.seed)
         held = self.take_step()
         self.n_sweeps += 1
         self.step_seconds = time.monotonic() - gathered
@@ -415,21 +402,19 @@ class Refinement:
     def take_step(self) -> np.ndarray:
         """Moves the texels; returns the errors of held-out pixels then. Texels are drawn to the usual roughness of their colour until, in one of
         the sweeps 1, 2, 4, 8, ..., a step without that explains these pixels clearly better."""
-        before, like = self.unknowns, self.similar.usual_gloss(self.unknowns)
-        free = like.clone()
-        free[:, ROUGHNESS] = torch.nan
-        steps = [self.after_step(before, like if self.is_like else free)]
+        before, usual = self.unknowns, self.similar.usual_roughness(self.unknowns)
+        steps = [self.after_step(before, usual if self.is_like else None)]
         if self.is_like and (self.n_sweeps + 1).bit_count() == 1:
-            steps.append(self.after_step(before, free))
+            steps.append(self.after_step(before, None))
             self.is_like = not is_worse(steps[0][1], steps[1][1])
         self.unknowns, held = steps[0] if self.is_like else steps[-1]
         self.equations.move(self.unknowns - before)
         return held
 
-    def after_step(self, before: Tensor, like: Tensor) -> tuple[Tensor, np.ndarray]:
-        """The unknowns after a step from those before, `like` as of :meth:`NormalEquations.step`, and the errors of held-out pixels."""
+    def after_step(self, before: Tensor, usual: Tensor | None) -> tuple[Tensor, np.ndarray]:
+        """The unknowns after a step from those before, `usual` as of :meth:`NormalEquations.step`, and the errors of held-out pixels."""
         limits = torch.tensor(STEP_LIMITS)
-        self.unknowns = into_range(before + self.equations.step(before, like).clamp(-limits, limits))
+        self.unknowns = into_range(before + self.equations.step(before, usual).clamp(-limits, limits))
         self._check("a texel", float(self.unknowns.abs().max()))  # NaN is passed on
         return self.unknowns, self.held_errors()
 

@@ -8,12 +8,10 @@ import torch
 from torch import Tensor
 
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
-from splitnerf.refinement.unknowns import METALLIC
+from splitnerf.refinement.unknowns import ROUGHNESS
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-# Distances to the values of similar texels from which on these pull less; the second is for metallic, whose pull ends
-# farther off.
-APART, METAL_APART = 0.3, 0.4
+APART = 0.3  # distance of the roughness to the usual one from which on that pulls less
 
 
 class Prior(NamedTuple):
@@ -27,7 +25,7 @@ class Prior(NamedTuple):
             that small differences are smoothed and edges are kept (Black and Anandan 1996).
         groups: Numbers of unknowns, in order, that have their edges in common.
         anchor: [n] weight of the distance to the start.
-        like: [n] weight of the distance d to the values of similar texels, see :func:`likeness`.
+        like: Weight of the distance d of the roughness to the usual one, whose cost is log(1 + (d / APART)^2).
     """
 
     pairs: Tensor
@@ -36,7 +34,7 @@ class Prior(NamedTuple):
     flat: Tensor
     groups: tuple[int, ...]
     anchor: Tensor
-    like: Tensor
+    like: float
 
     def flatness(self, unknowns: Tensor) -> Tensor:
         """[k, n] the weights by which squared differences have the gradient of their cost at unknowns [m, n]."""
@@ -56,18 +54,6 @@ class Prior(NamedTuple):
         other = torch.einsum("kab,ka->kb", self.frames, values[:, -2:])
         sums = values.new_zeros(m, values.shape[1]).index_add_(0, i, values)
         return sums.index_add_(0, j, -torch.cat([values[:, :-2], other], dim=1))
-
-
-def likeness(apart: Tensor) -> Tensor:
-    """[m, n] the weights by which squared distances [m, n] to the values of similar texels have the gradient of their
-    cost.
-
-    The costs are log(1 + (d / APART)^2), and for metallic (d / METAL_APART)^2 / (1 + (d / METAL_APART)^2), which is
-    bounded (Geman and McClure 1987).
-    """
-    weights = 1.0 / (1.0 + (apart / APART).square())
-    weights[:, METALLIC] = 1.0 / (1.0 + (apart[:, METALLIC] / METAL_APART).square()).square()
-    return weights
 
 
 class NormalEquations:
@@ -112,9 +98,9 @@ class NormalEquations:
         return self.prior.differences_adjoint(self.prior.differences(values) * weights, len(values))
 
     @torch.no_grad()
-    def step(self, unknowns: Tensor, like: Tensor, n_iterations: int = 20) -> Tensor:
+    def step(self, unknowns: Tensor, usual: Tensor | None, n_iterations: int = 20) -> Tensor:
         """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares.
-        `like` [m, n] are the values of similar texels, NaN where there are none.
+        `usual` [m] is the roughness that texels are drawn to; None: to none.
 
         Source: Nocedal and Wright 2006, section 10.3.
         """
@@ -122,8 +108,10 @@ class NormalEquations:
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown
         flat = prior.flatness(unknowns) * typical
         smooth = flat + prior.smooth * typical
-        anchor, unlike = prior.anchor * typical, torch.where(like.isnan(), 0.0, unknowns - like)
-        pull = torch.where(like.isnan(), 0.0, prior.like * typical * likeness(unlike))
+        anchor, unlike, pull = prior.anchor * typical, torch.zeros_like(unknowns), torch.zeros_like(unknowns)
+        if usual is not None:
+            unlike[:, ROUGHNESS] = unknowns[:, ROUGHNESS] - usual
+            pull[:, ROUGHNESS] = prior.like * typical[ROUGHNESS] / (1.0 + (unlike[:, ROUGHNESS] / APART).square())
         system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
         of_pairs = sum(torch.zeros_like(unknowns).index_add_(0, end, smooth) for end in prior.pairs.unbind(1))
         inverses = torch.linalg.inv(system + torch.diag_embed(of_pairs))
