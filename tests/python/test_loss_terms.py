@@ -133,6 +133,16 @@ def test_priors_of_the_shape_end(rendered):
     assert "smoothness" not in after
 
 
+@pytest.mark.parametrize(("error", "factor"), [(1 / 1500, 1.0), (1 / 6000, 0.25), (0.003, 4.5), (0.1, 10.0)])
+def test_normals_are_smoother_where_photos_are_explained_less(every_term, monkeypatch, error, factor):
+    from splitnerf.training import losses
+
+    monkeypatch.setattr(losses, "pixel_losses", lambda *_, **options: torch.tensor([error, 1.0]))
+    monkeypatch.setattr(losses, "gradient_losses", lambda *_: torch.tensor([2.0, 3.0]))
+    found, _, _ = every_term()
+    assert found["eikonal"] == (0.13, 2.0) and found["smoothness"] == (0.29, pytest.approx(3.0 * factor))
+
+
 def test_terms_that_draw_numbers_draw_others_with_each_step(every_term):
     """By the run's generator, and by the step's number as the seed of what has no generator."""
     for step in (8, 12):

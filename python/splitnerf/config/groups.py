@@ -222,7 +222,10 @@ class LossesSettings:
     light_prior_weight: float = setting(0.001, "weight of the distance to a smooth and grey light (of the pyramid)")
     entropy_weight: float = setting(0.002, "weight of the materials' quadratic entropy, from half of the run")
     seen_weight: float = setting(0.02, "weight of the distance to the light that photos show around the object")
-    smoothness_weight: float = setting(0.01, "weight of the difference of normals of neighbouring surface points")
+    smoothness_weight: float = setting(
+        0.01,
+        "weight of the difference of normals of neighbouring surface points, where colours have an error of 31.8 dB",
+    )
 
 
 @dataclass(frozen=True)

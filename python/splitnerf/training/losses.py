@@ -30,6 +30,8 @@ SEEN_TEXELS = 1024  # directions in which the light is compared with what photos
 SEEN_DEVIATION = 0.2  # of the log radiance
 RADIANCE_FLOOR = 1e-3  # radiance below it counts as dark
 ALBEDO_FLOOR = 0.01  # albedos below it count as the same black
+USUAL_ERROR = 1 / 1500  # of the colours, at which smoothness counts as its weight says
+MOST_SMOOTHER = 10.0  # factor of it where their error is larger
 
 
 class Term(NamedTuple):
@@ -118,7 +120,7 @@ def loss_terms(
     )
     terms.add(
         {"eikonal": kept * w.eikonal_weight, "smoothness": (shapes and w.smoothness_weight) or None},
-        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside),
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside) * trust(terms["colour"].value),
     )
     terms.add(
         {"metal": w.metal_weight or None, "dark_metal": w.dark_metal_weight or None},
@@ -141,6 +143,16 @@ def loss_terms(
     if environment is not None:
         terms.add({"occlusion": w.occlusion_weight}, occlusion_loss(ray, scene, environment, c, generator, step))
     return terms
+
+
+def trust(error: Tensor) -> Tensor:
+    """[2] factors of the eikonal and the smoothness loss at a mean squared error [] of the colours.
+
+    What the model does not explain counts as noise of the photos: the larger its variance, the more a prior counts beside them (Bishop 2006,
+    Eq. (3.55)). Where little is explained yet, or ever, as of a metal that mirrors itself, normals would fit the noise.
+    """
+    smooth = (error / USUAL_ERROR).clamp(max=MOST_SMOOTHER)
+    return torch.stack([torch.ones_like(smooth), smooth])
 
 
 def light_loss(light: Light, config: Config, generator: torch.Generator, seed: int) -> Tensor:
