@@ -17,16 +17,14 @@ def helm() -> list[Tube]:
     def engraved(s, t):
         panels = np.maximum(band(14 * s, 0.14), band(9 * t + 0.25 * np.sin(TAU * 3 * s), 0.20))
         rivets = smooth((np.cos(TAU * 72 * t) * np.cos(TAU * 42 * s) - 0.6) / 0.2) * band(7 * s + 0.25, 0.5)
-        return panels, rivets * (1 - panels)
+        return panels, rivets * (1 - panels), smooth((s - 0.47) / 0.02)
 
     def shell(s, t):
-        panels, rivets = engraved(s, t)
-        outside = smooth((s - 0.47) / 0.02)
+        panels, rivets, outside = engraved(s, t)
         return radius(s, t) * (1 + outside * (0.012 * rivets - 0.022 * panels))
 
     def paint(s, t):
-        panels, rivets = engraved(s, t)
-        outside = smooth((s - 0.47) / 0.02)
+        panels, rivets, outside = engraved(s, t)
         wear = noise(s, t, 60, 40, 71) + 0.5 * noise(s, t, 160, 110, 72)
         worn = smooth((wear - 1.0 + 0.3 * rivets) / 0.05)
         camouflage = smooth((noise(s, t, 9, 6, 73) - 0.5) / 0.02)
@@ -34,24 +32,18 @@ def helm() -> list[Tube]:
         coat = mix(mix((0.030, 0.045, 0.035), (0.060, 0.045, 0.028), camouflage), (0.42, 0.33, 0.10), letters)
         steel = mix((0.20, 0.19, 0.18), (0.34, 0.31, 0.28), noise(s, t, 90, 30, 74))
         colour = mix(mix(coat, steel, worn), (0.025, 0.022, 0.020), 0.9 * panels)
-        rough = mix((0.22,), (0.30,), noise(s, t, 40, 30, 75))[..., 0] + 0.15 * worn + 0.25 * panels
+        rough = 0.22 + 0.08 * noise(s, t, 40, 30, 75) + 0.15 * worn + 0.25 * panels
         leather = mix((0.05, 0.03, 0.02), (0.09, 0.05, 0.03), noise(s, t, 80, 40, 76))
         metal = np.round(worn * (1 - panels)) * outside
-        return mix(leather, colour, outside), mix((0.7,), rough[..., None], outside)[..., 0], metal
+        return mix(leather, colour, outside), 0.7 + (rough - 0.7) * outside, metal
 
     def glass(s, t):
-        return (
-            mix((0.012, 0.012, 0.016), (0.05, 0.03, 0.015), band(6 * s, 0.2)),
-            0.08 + 0.05 * noise(s, t, 9, 6, 77),
-            0.0,
-        )
+        colour = mix((0.012, 0.012, 0.016), (0.05, 0.03, 0.015), band(6 * s, 0.2))
+        return colour, 0.08 + 0.05 * noise(s, t, 9, 6, 77), 0.0
 
     def rubber(s, t):
-        return (
-            mix((0.03, 0.03, 0.032), (0.015, 0.015, 0.016), band(24 * s, 0.6)),
-            0.45 + 0.1 * noise(s, t, 20, 4, 78),
-            0.0,
-        )
+        colour = mix((0.03, 0.03, 0.032), (0.015, 0.015, 0.016), band(24 * s, 0.6))
+        return colour, 0.45 + 0.1 * noise(s, t, 20, 4, 78), 0.0
 
     visor = through(
         lambda s: np.stack([0.70 + 0 * s, 0.42 * (2 * s - 1), 0.02 + 0 * s], 1),
@@ -105,9 +97,9 @@ def casket() -> list[Tube]:
         )
 
     tubes = [Tube(curve, square, paint, (640, 512), 1536, 2)]
+    foot = [(0, -0.62), (0.08, -0.62), (0.12, -0.52), (0.06, -0.40), (0, -0.40)]
+    spin, size = lathe(finely(rounded(foot, 0.03), 65))
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        foot = finely(rounded([(0, -0.62), (0.08, -0.62), (0.12, -0.52), (0.06, -0.40), (0, -0.40)], 0.03), 65)
-        spin, size = lathe(foot)
         moved = lambda s, at=np.array([0.56 * x, 0.38 * y, 0]): (spin(s)[0] + at, *spin(s)[1:])
         tubes.append(Tube(moved, size, brass, (64, 32), 64))
     for x in (-1, 1):

@@ -23,7 +23,7 @@ def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = No
     """[m, n] where the steps end if each unknown of each texel was observed once, with one precision."""
     m = len(observed)
     equations, unknowns = NormalEquations(torch.zeros(m, N_UNKNOWNS), prior, 0.0), torch.zeros(m, N_UNKNOWNS)
-    for _ in range(n_steps):
+    for _ in range(60):
         for begin in range(0, N_UNKNOWNS, 3):
             of_channel = torch.zeros(m, 3, N_UNKNOWNS)
             for c in range(min(3, N_UNKNOWNS - begin)):

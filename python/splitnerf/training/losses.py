@@ -120,7 +120,7 @@ def loss_terms(
     )
     terms.add(
         {"eikonal": kept * w.eikonal_weight, "smoothness": (shapes and w.smoothness_weight) or None},
-        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside) * trust(terms["colour"].value),
+        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside) * prior_factors(terms["colour"].value),
     )
     terms.add(
         {"metal": w.metal_weight or None, "dark_metal": w.dark_metal_weight or None},
@@ -145,7 +145,7 @@ def loss_terms(
     return terms
 
 
-def trust(error: Tensor) -> Tensor:
+def prior_factors(error: Tensor) -> Tensor:
     """[2] factors of the eikonal and the smoothness loss at a mean squared error [] of the colours.
 
     What the model does not explain counts as noise of the photos: the larger its variance, the more a prior counts beside them (Bishop 2006,
