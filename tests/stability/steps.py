@@ -74,8 +74,8 @@ def chain() -> Prior:
     """A chain of texels: neighbours are joined, and each is held a little where it is."""
     pairs = torch.arange(TEXELS - 1)[:, None] + torch.arange(2)
     weights = {name: torch.full((N_UNKNOWNS,), x) for name, x in (("smooth", 0.05), ("anchor", 1e-2))}
-    none = {name: torch.zeros(N_UNKNOWNS) for name in ("flat", "like")}
-    return Prior(pairs=pairs, frames=torch.eye(2).expand(len(pairs), 2, 2), groups=GROUPS, **weights, **none)
+    frames, flat = torch.eye(2).expand(len(pairs), 2, 2), torch.zeros(N_UNKNOWNS)
+    return Prior(pairs=pairs, frames=frames, groups=GROUPS, flat=flat, like=0.0, **weights)
 
 
 def texels_solved(draw: Draw, n: int) -> tuple[Tensor, Rows]:
@@ -89,7 +89,7 @@ def texels_solved(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     for case in range(n):
         equations = NormalEquations(here, chain(), 0.0)
         equations.add(texels, shares, *(x[case] for x in rows.values()))
-        step = equations.step(here, torch.full_like(here, torch.nan), 60).double().flatten()
+        step = equations.step(here, None, 60).double().flatten()
         matrix, right = system(equations)
         best = torch.linalg.solve(matrix, right)
         gained, most = (x @ right - 0.5 * x @ matrix @ x for x in (step, best))
