@@ -25,7 +25,7 @@ FUZZ_SECONDS ?= 600
 STABILITY_CASES ?= 10000000
 STABILITY_OPTIONS ?=
 # With a compiler cache, what the package has compiled is not compiled again for the tests: by the same name of the compiler.
-CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true)
+CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true) CMAKE_CUDA_COMPILER_LAUNCHER=$$(command -v ccache || true)
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 PAGE ?=
 EXTRAS := batch_on_ray export relight progress photos view_page report_page training_page three_page

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PAGE = Path(__file__).parents[1] / "docs" / "licences.md"
-EXTRAS = ("photos", "heic", "raw", "video", "bench", "lpips", "usd", "blender", "batch", "tensorboard")
+EXTRAS = ("photos", "heic", "raw", "video", "bench", "usd", "blender", "batch", "tensorboard")
 SHORT = 40  # characters of a licence's name; longer is its text
 # What the first licence in a text begins with; a BSD licence is told by what follows within FAR characters.
 MIT, BSD, THIRD_CLAUSE, FAR = "Permission is hereby granted, free of charge", "Redistribution and use in source", "Neither the name", 1500

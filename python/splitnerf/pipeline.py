@@ -195,7 +195,7 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
     if is_refined(run):
         n = max(REPORT_VIEWS, VIEW_BUDGET // (views.height * views.width))
         views = views.select(spread(range(len(views)), min(n, len(views))))
-    evaluated = score_run(run, model, training.grid, views, mesh, timings, {}, Protocol.spp)
+    evaluated = score_run(run, model, training.grid, views, mesh, timings, {}, Protocol())
     timings["evaluation"] = time.monotonic() - clock
     write_run_report(run, model, evaluated, timings)
     forget_state(run)
@@ -243,7 +243,7 @@ def score_run(
     mesh: trimesh.Trimesh | None,
     timings: dict[str, float],
     maps: dict[str, Path],
-    spp: int,
+    protocol: Protocol,
 ) -> Evaluated:
     """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields.
     Where the run learned exposures, each view gets one by its own image.
@@ -251,16 +251,19 @@ def score_run(
     Args:
         mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
         timings: Seconds by part, "training" at least; that of a refinement is added.
-        maps: Environment maps of relit views by name, which are rendered of mesh.glb with `spp` paths a pixel.
+        maps: Environment maps of relit views by name, which are rendered of mesh.glb.
     """
+    spp, distance = protocol.spp, protocol.distance()
     asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
     free = (run / EXPOSURES).is_file()
     if is_refined(run):
         timings["refinement"] = read_json(run / RECORD, "seconds")["seconds"]
         seconds = round(timings["training"] + timings["refinement"], 1)
-        evaluated = score_asset(asset, read_environment(run / "environment.exr"), views, maps, spp, seconds, free)
+        evaluated = score_asset(
+            asset, read_environment(run / "environment.exr"), views, maps, spp, seconds, free, distance
+        )
         return replace(evaluated, scores=evaluated.scores | {"refinement": refinement_summary(run)})
-    return score_fields(model, grid, views, mesh, asset, maps, spp, timings["training"], free)
+    return score_fields(model, grid, views, mesh, asset, maps, spp, timings["training"], free, distance)
 
 
 def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings: dict[str, float]) -> None:
@@ -302,7 +305,7 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
     mesh = read_mesh(run / "mesh.ply") if (run / "mesh.ply").is_file() else None
     timings = {"training": content["seconds"]}
     with locked(run) if out is None else nullcontext():
-        evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol.spp)
+        evaluated = score_run(run, model, grid, views, mesh, timings, maps, protocol)
         timings["evaluation"] = time.monotonic() - clock
         if out is None:
             write_run_report(run, model, evaluated, timings)

@@ -9,6 +9,7 @@ detail.jpg: a test view's middle of the trained asset, projection, detail and tr
 """
 
 import argparse
+import math
 import sys
 import time
 from dataclasses import replace
@@ -93,7 +94,7 @@ def rows_of(run: Path, data: Path, averages: list[int]) -> tuple[list[str], np.n
         if average == averages[0]:
             made.append(("projection", edge, projected(photos, asset, light, size), "-"))
         started = time.monotonic()
-        detailed = with_detail(photos, asset, light, size)
+        detailed = with_detail(photos, asset, light, size, math.inf, lambda share: None)
         label = "detail" if wanted else "detail, which a run leaves out here"
         made.append((label, edge, detailed, f"{time.monotonic() - started:.0f}"))
     for label, edge, result, seconds in made:

@@ -1,12 +1,14 @@
 """Whole reconstructions with their scores: pages of docs/benchmarks, made by `splitnerf` alone.
 
-    python tests/bench/results.py [shapes|scenes|kinds|time ...] [--list] [--work runs/results]
+    python tests/bench/results.py [shapes|scenes|kinds|time|skips ...] [--list] [--work runs/results]
 
     shapes    eight hollow shapes in three materials, 4 minutes each
     scenes    objects with full truth, 30 minutes each
     kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
     time      error against time: half a minute to 30 minutes, two objects, two seeds
+    skips     training with and without what a step leaves out, by equal time and by equal steps
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
+    parts     the published method in small (2000 steps), and with our part in the place of one of its own
     ablation  what each part of the method is worth behind the refinement, by equal steps (splitnerf ablate); hours
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
@@ -24,6 +26,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,15 +62,51 @@ SCORES = {  # column: the evaluation's keys, digits
     "light, dB": (("light_psnr",), 1),
     "F-score": (("f_score",), 3),
     "steps": (("training", "step"), 0),
+    "ms a step": (("training", "ms"), 1),
 }
+SKIPS = {  # what a step leaves out, with the settings that have it done
+    "space outside the hull": ("hull_until=0",),
+    "faint samples": ("sampling.min_weight=0",),
+    "every other sample": ("step_scale=1", "min_step=0.005"),
+    "shading of most samples": ("shades_per_ray=0",),
+    "most steps of the light": ("light_step_every=1",),
+}
+ALONE = "--set", "refinement.enabled=false"  # training, without what comes after it
+PARTS = {  # our part in the place of one of the paper's
+    "normals by derivatives": ("surface.normals=analytic",),
+    "smoothness of normals": ("losses.smoothness_weight=0.03",),
+    "eikonal weight": ("losses.eikonal_weight=0.3",),
+    "masks": ("losses.mask_weight=1",),
+    "shape at the start": ("surface.start=stereo",),
+    "hash grid": ("surface.n_levels=9", "surface.growth=1.4697", "surface.log2_table_size=17", "base_resolution=16"),
+    "linear colours": ("shading.compositing=linear",),
+    "materials": ("materials.inputs=grid",),
+    "light": ("light.kind=pyramid",),
+    "occlusion": ("occlusion.kind=bits",),
+}
+
+
+def with_settings(words: tuple, settings: tuple[str, ...]) -> tuple:
+    """Words of `splitnerf train` with further settings."""
+    return (*words, *(word for setting in settings for word in ("--set", setting)))
+
+
+PAPER = with_settings(("--preset", "paper"), ("target_samples=4096", "mesh.resolution=192", "run.preview_every=1"))
+PAPER = with_settings(PAPER, ("light_samples=2048", "light_queries=2048"))
+SMALL = with_settings(
+    (*PAPER, "--downscale", 2), ("target_samples=1024", "mesh.resolution=96", "export.resolution=192")
+)
+SMALL = with_settings(SMALL, tuple(f"{of}_width=64" for of in ("materials", "light", "occlusion")))
 SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     "cpu": (),
-    "paper": (
-        *("--preset", "paper", "--steps", 20000, "--set", "target_samples=4096", "--set", "light_samples=2048"),
-        *("--set", "light_queries=2048", "--set", "mesh.resolution=192", "--set", "run.preview_every=1"),
-    ),
+    "paper": PAPER,
+    "small paper": SMALL,
+    **{f"small paper, our {name}": with_settings(SMALL, settings) for name, settings in PARTS.items()},
+    "all skips": ALONE,
+    **{f"without: {name}": with_settings(ALONE, offs) for name, offs in SKIPS.items()},
+    "no skips": with_settings(ALONE, tuple(off for offs in SKIPS.values() for off in offs)),
 }
-STEPS_TAKE = {"paper": 300}  # minutes of the runs that steps end, on two cores
+STEPS_TAKE = {"paper": 300, "ablation": 128}  # minutes of the runs that steps end, on two cores; others: 3
 ABLATED = "boombox", "corset"
 MOST_LINES = 9  # of a page's table; a longer one lists what runs deliver, and its CSV file has the rest
 ABLATION = (
@@ -95,7 +134,7 @@ Row = dict[str, str]
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, what it holds, and its runs: settings and minutes, 0 for as long as the steps take."""
+    """A page: its title, what it holds, and its runs: settings and minutes, 0 for as long as `steps` take."""
 
     title: str
     scenes: tuple[str, ...]
@@ -103,11 +142,19 @@ class Page:
     size: int
     seeds: int = 1
     pictures: bool = False
+    steps: int = 0
+    table: tuple[str, tuple[str, ...], tuple[str, ...]] | None = (
+        None  # what has lines, and columns, and what these hold; None: rows
+    )
 
 
 PAGES = {
     "shapes": Page(
-        "Hollow shapes", tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS), (("cpu", 4),), 120
+        "Hollow shapes",
+        tuple(f"{shape} {material}" for shape in SHAPES for material in MATERIALS),
+        (("cpu", 4),),
+        120,
+        table=("shape", ("material",), ("F-score", "normals, degrees", "albedo, dB", "novel views, dB")),
     ),
     "scenes": Page(
         "Objects",
@@ -117,10 +164,34 @@ PAGES = {
     ),
     "kinds": Page("Unseen kinds", tuple(KINDS), (("cpu", 8),), 100, pictures=True),
     "time": Page(
-        "Error against time", ("boombox", "knot"), tuple(("cpu", m) for m in (0.5, 1, 2, 4, 8, 15, 30)), 200, 2
+        "Error against time",
+        ("boombox", "knot"),
+        tuple(("cpu", m) for m in (0.5, 1, 2, 4, 8, 15, 30)),
+        200,
+        2,
+        table=("minutes", ("scene", "asset"), ("relit, dB", "albedo, dB")),
+    ),
+    "skips": Page(
+        "Training with and without its skips",
+        ("boombox", "knot"),
+        tuple((name, minutes) for minutes in (2, 0) for name in SETTINGS if "skips" in name or "without" in name),
+        200,
+        steps=3000,
+        table=("settings", ("scene", "minutes"), ("relit, dB", "albedo, dB", "ms a step")),
     ),
     "paper": Page(
-        "The published method, 1/64 of the samples, all steps", ("boombox",), (("cpu", 30), ("paper", 0)), 200
+        "The published method, 1/64 of the samples, all steps",
+        ("boombox",),
+        (("cpu", 30), ("paper", 0)),
+        200,
+        steps=20000,
+    ),
+    "parts": Page(
+        "The published method with one of our parts, in small",
+        ("boombox",),
+        tuple((name, 0) for name in SETTINGS if name.startswith("small paper")),
+        200,
+        steps=2000,
     ),
 }
 NAMES = *PAGES, "ablation"
@@ -187,9 +258,11 @@ def rows_of(
     if (data := data_of(scene, page.size, work)) is None:
         print(f"{scene}: no data, left out", file=sys.stderr)
         return []
-    run = work / f"runs/{scene.replace(' ', '_')}_{settings}_{minutes:g}_{seed}"
+    run = work / f"runs/{scene} {settings} {minutes:g} {seed}".replace(" ", "_").replace(":", "")
     facts = provenance(SOURCES)  # before, as the sources may change meanwhile
-    limits = ("--max-minutes", minutes, "--overwrite") if minutes else ("--resume", "auto")  # the latter takes hours
+    limits = ("--max-minutes", minutes, "--overwrite")
+    if not minutes:  # this may take hours
+        limits = "--steps", page.steps, "--resume", "auto"
     if not splitnerf("train", data, "--out", run, *SETTINGS[settings], *limits, "--seed", seed):
         return []
     rows, files = [], {"trained": source_of(run) / "mesh.glb", "refined": run}
@@ -202,7 +275,7 @@ def rows_of(
         threads = os.environ.get("OMP_NUM_THREADS", "all")
         key = dict(zip(KEYS, (scene, settings, f"{minutes:g}", str(seed), f"{page.size}", threads, asset)))
         found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
-        found["training"] = json.loads((run / METRICS).read_text().splitlines()[-1])
+        found["training"] = late_steps(run)
         if blender:
             found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, work)
         rows.append(key | scored(found) | {name: facts[name] for name in ("kernels", "commit")})
@@ -210,6 +283,16 @@ def rows_of(
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
         splitnerf("evaluate", run, "--data", data, "--spp", 64, "--views", 1, "--sheet", sheet)
     return rows
+
+
+def late_steps(run: Path) -> dict:
+    """How many steps a run made, and the time of one in its last fifth."""
+    lines = [json.loads(line) for line in (run / METRICS).read_text().splitlines()]
+    last = lines[-1]
+    first = min(
+        lines[:-1], key=lambda line: abs(line["step"] - 0.8 * last["step"]), default={"step": 0, "seconds": 0.0}
+    )
+    return {"step": last["step"], "ms": 1e3 * (last["seconds"] - first["seconds"]) / (last["step"] - first["step"])}
 
 
 def sheet_of(scene: str, work: Path) -> Path:
@@ -249,9 +332,6 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
     of_rows = ("threads", "processor", "kernels") if len({row["kernels"] for row in rows}) > 1 else ("threads",)
     facts = {name: value for name, value in facts.items() if name not in of_rows}
     write_csv(out / f"{name}.csv", facts, [COLUMNS, *([row[column] for column in COLUMNS] for row in rows)])
-    always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
-    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]
-    listed = rows if len(rows) <= MOST_LINES else [row for row in rows if row["asset"] == "refined"]
     lines = [f"# {page.title}", "", header(facts), ""]
     if name == "time":
         draw(out / f"{name}.png", rows)
@@ -265,14 +345,48 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         "*trained* is what training alone exports, *refined* what a run delivers; the minutes are those of both. Scores are defined in",
         "[results](../results.md#how-scores-are-defined); relit views are path traced by the program.",
         "",
-        "| " + " | ".join(shown) + " |",
-        "|" + " --- |" * len(shown),
-        *("| " + " | ".join(cell(row, column) for column in shown) + " |" for row in listed),
+        *(table_of(rows, page) if page.table is None else table_of_means(rows, page)),
         "",
-        *means(rows),
+        *(means(rows) if page.table is None else ()),
     ]
     with atomic_path(out / f"{name}.md") as temporary:
         temporary.write_text("\n".join(lines))
+
+
+def table_of(rows: list[Row], page: Page) -> list[str]:
+    """A line for each row, those of training alone left out where there are many."""
+    always = {"scene", "minutes", *(column for column in SCORES if any(row[column] for row in rows))}
+    shown = [column for column in COLUMNS if len({row[column] for row in rows}) > 1 or column in always]
+    if len(rows) > MOST_LINES:
+        rows = [row for row in rows if row["asset"] == "refined"]
+    lines = [shown, ["---"] * len(shown), *([cell(row, column, page) for column in shown] for row in rows)]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def table_of_means(rows: list[Row], page: Page) -> list[str]:
+    """Means over rows that stand at the same place of the page's table."""
+    down, across, values = page.table
+    if "asset" not in across and any(row["asset"] == "refined" for row in rows):
+        rows = [row for row in rows if row["asset"] == "refined"]
+    places: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        row = row | dict(zip(("shape", "material"), row["scene"].split()))
+        units = (" minutes" * (key == "minutes" and row[key] != "0") for key in across)
+        column = ", ".join(cell(row, key, page) + unit for key, unit in zip(across, units))
+        places.setdefault((cell(row, down, page), column), []).append(row)
+    columns = list(dict.fromkeys(column for _, column in places))
+    lines = [[down, *columns], ["---"] * (1 + len(columns))]
+    for line in dict.fromkeys(line for line, _ in places):
+        found = [places.get((line, column), []) for column in columns]
+        lines.append([line, *(" / ".join(mean_of(here, value) for value in values) for here in found)])
+    what = f"Each place of the table: {' / '.join(values)}; means over seeds. Commits and all other scores are in the CSV file."
+    return [what, "", *(f"| {' | '.join(line)} |" for line in lines)]
+
+
+def mean_of(rows: list[Row], column: str) -> str:
+    """The mean of a column in its digits; "-" without a number."""
+    found = [float(row[column]) for row in rows if row[column]]
+    return f"{sum(found) / len(found):.{SCORES[column][1]}f}" if found else "-"
 
 
 def write_ablation(out: Path, work: Path) -> bool:
@@ -305,9 +419,9 @@ def place(row: Row, page: Page) -> tuple:
     return at, float(row["minutes"]), row["seed"], row["asset"] == "refined"
 
 
-def cell(row: Row, column: str) -> str:
+def cell(row: Row, column: str, page: Page) -> str:
     """The text of a row's column."""
-    return "all steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
+    return f"{page.steps} steps" if (column, row[column]) == ("minutes", "0") else row[column] or "-"
 
 
 def means(rows: list[Row]) -> list[str]:
@@ -349,6 +463,29 @@ def draw(path: Path, rows: list[Row]) -> None:
     figure.savefig(path, dpi=110)
 
 
+def key_of(row: Row) -> tuple:
+    """What a run of a page is known by."""
+    return tuple(row[key] for key in KEYS[:4])
+
+
+def taken(settings: str, minutes: float) -> float:
+    """The minutes that a training takes."""
+    return minutes or STEPS_TAKE.get(settings, 3)
+
+
+def missing(name: str, args: argparse.Namespace) -> Iterator[tuple[str, str, float, int]]:
+    """Scene, settings, minutes and seed of each run that a page lacks."""
+    if name == "ablation":
+        yield "8 rows of 2 scenes", "ablation", 0, 0
+        return
+    page, there = PAGES[name], set(map(key_of, () if args.again else read_rows(args.out / f"{name}.csv")))
+    for seed in range(page.seeds):
+        for scene in args.only or page.scenes:
+            for settings, minutes in [("cpu", m) for m in args.minutes or ()] or page.runs:
+                if (scene, settings, f"{minutes:g}", str(seed)) not in there:
+                    yield scene, settings, minutes, seed
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pages", nargs="*", metavar="PAGE", help=f"{', '.join(NAMES)} (default: all)")
@@ -363,34 +500,24 @@ def main() -> int:
     if unknown := [name for name in args.pages if name not in NAMES]:
         parser.error(f"unknown page {unknown[0]}; there are {', '.join(NAMES)}")
     args.work.mkdir(parents=True, exist_ok=True)
-    failed, total = False, 0.0
-    for name in args.pages or NAMES:
+    runs = [(name, *run) for name in args.pages or NAMES for run in missing(name, args)]
+    for name, scene, settings, minutes, seed in runs if args.list else ():
+        print(f"{name}: {scene}, {settings}, {taken(settings, minutes):g} minutes, seed {seed}")
+    print(
+        f"{sum(taken(settings, minutes) for _, _, settings, minutes, _ in runs):g} minutes of training are missing",
+        flush=True,
+    )
+    failed = False
+    for name, scene, settings, minutes, seed in () if args.list else runs:
         if name == "ablation":
-            if args.list:
-                print("ablation: 8 rows of 2 scenes, 8 minutes each")
-            total += 128
-            failed |= not args.list and not write_ablation(args.out, args.work)
+            failed |= not write_ablation(args.out, args.work)
             continue
-        page, rows = PAGES[name], read_rows(args.out / f"{name}.csv")
-        for seed in range(page.seeds):
-            for scene in args.only or page.scenes:
-                for settings, minutes in [("cpu", m) for m in args.minutes or ()] or page.runs:
-                    key = scene, settings, f"{minutes:g}", str(seed)
-                    if not args.again and any(tuple(row[k] for k in KEYS[:4]) == key for row in rows):
-                        continue
-                    taken = minutes or STEPS_TAKE[settings]
-                    total += taken
-                    if args.list:
-                        print(f"{name}: {scene}, {settings}, {taken:g} minutes, seed {seed}")
-                        continue
-                    found = rows_of(scene, settings, minutes, seed, page, args.work, args.blender)
-                    failed |= not found
-                    if found:
-                        now = read_rows(args.out / f"{name}.csv")  # a second process may have added rows
-                        rows = [row for row in now if tuple(row[k] for k in KEYS[:4]) != key] + found
-                        rows.sort(key=lambda row: place(row, page))
-                        write_page(args.out, name, rows, args.work)
-    print(f"{total:g} minutes of training" + (" are missing" if args.list else ""))
+        found = rows_of(scene, settings, minutes, seed, PAGES[name], args.work, args.blender)
+        failed |= not found
+        if found:
+            key, now = key_of(found[0]), read_rows(args.out / f"{name}.csv")  # a second process may have added rows
+            rows = sorted([*(r for r in now if key_of(r) != key), *found], key=lambda row: place(row, PAGES[name]))
+            write_page(args.out, name, rows, args.work)
     return int(failed)
 
 

@@ -1,8 +1,9 @@
-"""The budget of a training step: the time of each operator on one and two threads, by instruction set, and what it moves.
+"""The budget of a training step: the time of each operator on one and two threads, by instruction set, and its share of a limit.
 
     python tests/bench/step.py RUN DATA [--steps 200] [--out docs/benchmarks/step.md]
 
-RUN is a finished training of DATA. The steps are those near its end. `splitnerf doctor` must pass before anything is timed.
+RUN is a finished training of DATA. The steps are those near its end. The operators must pass `splitnerf doctor`'s test with each
+instruction set before anything is timed.
 """
 
 import argparse
@@ -17,8 +18,17 @@ from collections import Counter
 from pathlib import Path
 
 CASES = tuple((isa, threads) for isa in ("avx2", "avx512") for threads in (1, 2))
+OTHERS = {  # what keeps torch to an instruction set, too
+    "avx2": {"ATEN_CPU_CAPABILITY": "avx2", "MKL_ENABLE_INSTRUCTIONS": "AVX2", "ONEDNN_MAX_CPU_ISA": "AVX2"},
+    "avx512": {},
+}
 LATE = 0.9  # the progress of the timed steps
-LEAST = 0.4  # ms, below which an operator is counted with the others
+LEAST = 0.3  # ms, below which an operator is counted with the others
+GROUPS = {
+    "splitnerf::": "other operators of splitnerf",
+    "aten::": "other operators of torch",
+    "": "autograd's nodes and the rest",
+}
 SOURCES = tuple(f"cpp/{name}" for name in ("src", "include", "torch"))
 SOURCES += tuple(f"python/splitnerf/{name}" for name in ("training", "render", "fields"))
 
@@ -29,21 +39,31 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
     from splitnerf.pipeline import load_splits
     from splitnerf.training.checkpoint import config_of, load_checkpoint
     from splitnerf.training.loop import Training
+    from splitnerf_tools.doctor.self_test import failures
     from torch.profiler import ProfilerActivity, profile
     from torch.utils._python_dispatch import TorchDispatchMode
     from torch.utils._pytree import tree_leaves
 
-    class Bytes(TorchDispatchMode):
-        """Adds up the sizes of the tensors that each operator reads and writes."""
+    if failed := failures("cpu"):
+        sys.exit(f"nothing is timed, as operators fail their test: {failed}")
+
+    class Work(TorchDispatchMode):
+        """Adds up what each operator does: bytes of the tensors that it reads and writes, random reads, flops."""
 
         def __init__(self):
             super().__init__()
-            self.moved = Counter()
+            self.moved, self.gathers, self.flops = Counter(), Counter(), Counter()
 
         def __torch_dispatch__(self, func, types, args=(), kwargs=None):
-            result = func(*args, **(kwargs or {}))
+            result, name = func(*args, **(kwargs or {})), func.name().split(".")[0]
             tensors = {id(x): x for x in tree_leaves((args, kwargs, result)) if isinstance(x, torch.Tensor)}
-            self.moved[func.name().split(".")[0]] += sum(x.numel() * x.element_size() for x in tensors.values())
+            self.moved[name] += sum(x.numel() * x.element_size() for x in tensors.values())
+            of = dict(zip((argument.name for argument in func._schema.arguments), args))
+            if "n_active" in of:
+                gathers, flops = field_work(name.removeprefix("splitnerf::"), of)
+                points = int(result[4].sum()) if name.endswith("sample_rays") else len(of["positions"])
+                self.gathers[name] += points * gathers
+                self.flops[name] += points * flops
             return result
 
     class Silent:
@@ -70,18 +90,39 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
         wall = sorted(steps(n_steps // 5) for _ in range(5))[2]
         with profile(activities=[ProfilerActivity.CPU]) as profiled:
             steps(n_steps)
-        with Bytes() as counted:
+        with Work() as work:
             steps(16)  # a whole period of what is refreshed
         rows = {
-            event.key: (event.self_cpu_time_total / n_steps / 1e3, event.count / n_steps, counted.moved[event.key] / 16)
+            event.key: (
+                event.self_cpu_time_total / n_steps / 1e3,
+                event.count / n_steps,
+                *(counter[event.key] / 16 for counter in (work.moved, work.gathers, work.flops)),
+            )
             for event in profiled.key_averages()
         }
+        level, at = torch.rand(1 << 17, dtype=torch.float64), torch.randint(1 << 17, (1 << 21,))  # entries of 8 bytes
+        gather = min(_timed(lambda: level.index_select(0, at)) for _ in range(5))
         big = torch.rand(1 << 24)
         copy = min(_timed(lambda: big.clone()) for _ in range(5))
         square = torch.rand(1024, 1024)
         product = min(_timed(lambda: square @ square) for _ in range(5))
-        rates = {"copy": 2 * 4 * len(big) / copy / 1e9, "flops": 2 * 1024**3 / product / 1e9}
+        rates = {
+            "copy": 8 * len(big) / copy / 1e9,
+            "gathers": len(at) / gather / 1e9,
+            "flops": 2 * 1024**3 / product / 1e9,
+        }
         return {"wall": wall, "rays": training.n_rays, "rows": rows, **rates}
+
+
+def field_work(operator: str, of: dict) -> tuple[int, int]:
+    """The random reads (and additions) and the flops of an operator of the distance field at a point, from its arguments."""
+    corners, n_features = 8 * of["n_active"], of["table"].shape[1]
+    (width, n_inputs), n_outputs = of["hidden"].shape, of["out"].shape[0]
+    layer, last, encoding = 2 * width * n_inputs, 2 * width * n_outputs, 2 * corners * n_features
+    return {
+        "sdf_field": (corners, 2 * layer + last + 4 * encoding),  # also the derivatives by the position
+        "sdf_field_backward": (2 * corners, 6 * layer + 3 * last + 8 * encoding),
+    }.get(operator, (corners, layer + 2 * width + encoding))
 
 
 def _timed(body) -> float:
@@ -92,7 +133,7 @@ def _timed(body) -> float:
 
 def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int) -> dict | None:
     """What a process of its own measures; None where the processor has no such instruction set."""
-    environment = os.environ | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
+    environment = os.environ | OTHERS[isa] | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
     words = [sys.executable, __file__, run, data, "--steps", str(n_steps), "--measure"]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
@@ -107,36 +148,48 @@ def page(cases: dict[tuple[str, int], dict], head: str) -> str:
     lines = ["# A training step", "", head, "", f"{rays} rays a step, near the end of a run.", ""]
     lines += ["| | " + " | ".join(f"{isa}, {threads} thread{'s' * (threads > 1)}" for isa, threads in cases) + " |"]
     lines += ["|---|" + "---|" * len(cases)]
-    rows = {"wall": "a step, ms", "copy": "copying memory, GB/s", "flops": "a matrix product, GFLOP/s"}
+    rows = {
+        "wall": "a step, ms",
+        "copy": "copying memory, GB/s",
+        "gathers": "random reads of 8 bytes from 1 MB, 10^9 a second",
+        "flops": "a matrix product, GFLOP/s",
+    }
     for key, name in rows.items():
-        lines.append(f"| {name} | " + " | ".join(f"{case[key]:.1f}" for case in cases.values()) + " |")
-    columns = "| operator | ms | calls | ms on 2 threads | divided | 8 cores, by count | MB | GB/s |"
+        lines.append(f"| {name} | " + " | ".join(f"{case[key]:.3g}" for case in cases.values()) + " |")
+    columns = "| operator | ms | calls | ms on 2 threads | divided | 8 cores, by count | MB | share of its limit |"
     for isa in sorted({isa for isa, _ in cases}):
         one, two = cases[isa, 1], cases[isa, 2]
         lines += ["", f"## {isa}", "", columns, "|---" * 8 + "|"]
-        small, eight = [0.0, 0.0, 0.0], 0.0
+        groups, eight = {group: [0.0, 0.0, 0.0] for group in GROUPS}, 0.0
         ordered = sorted(one["rows"].items(), key=lambda row: -row[1][0])
-        for name, (ms, calls, moved) in ordered:
+        for name, (ms, calls, moved, gathers, flops) in ordered:
             on_two = two["rows"].get(name, (ms,))[0]
             share = min(1.0, max(0.0, 2 * (1 - on_two / ms))) if ms > 0 else 0.0
             on_eight = ms * (1 - share + share / 8)
             eight += on_eight
             if ms < LEAST:
-                small = [a + b for a, b in zip(small, (ms, calls, on_two))]
+                group = next(start for start in GROUPS if name.startswith(start))
+                groups[group] = [a + b for a, b in zip(groups[group], (ms, calls, on_two))]
                 continue
-            rate = f"{moved / ms / 1e6:.1f}" if moved else "-"
+            least = {
+                "bandwidth": moved / one["copy"],
+                "reads": gathers / one["gathers"],
+                "FMA": flops / one["flops"],
+            }  # ns
+            of = max(least, key=least.get)
+            limit = f"{least[of] / ms / 1e6:.0%}, {of}" if moved else "-"
             lines.append(
-                f"| {name} | {ms:.2f} | {calls:.1f} | {on_two:.2f} | {share:.0%} | {on_eight:.2f} | {moved / 1e6:.2f} | {rate} |"
+                f"| {name} | {ms:.2f} | {calls:.1f} | {on_two:.2f} | {share:.0%} | {on_eight:.2f} | {moved / 1e6:.2f} | {limit} |"
             )
-        lines.append(
-            f"| all others, each below {LEAST} ms | {small[0]:.2f} | {small[1]:.0f} | {small[2]:.2f} | | | | |"
-        )
+        for group, (ms, calls, on_two) in groups.items():
+            lines.append(f"| {GROUPS[group]}, each below {LEAST} ms | {ms:.2f} | {calls:.0f} | {on_two:.2f} | | | | |")
         total, on_two = (sum(row[0] for row in case["rows"].values()) for case in (one, two))
         lines.append(f"| sum | {total:.2f} | | {on_two:.2f} | | {eight:.2f} | | |")
     lines += [
         "",
         "Times are those of torch's profiler, about a microsecond too long for each call. MB: the tensors that an operator reads and writes. *Divided*:",
-        "the share of the time that two threads halve; *8 cores* follows from it by Amdahl's law and was not measured.",
+        "the share of the time that two threads halve; *8 cores* follows from it by Amdahl's law and was not measured. *Share of its limit*: the time that",
+        "the bytes, the random reads of the hash grid or the flops of the networks alone would take at the rates above, whichever is longest.",
         "",
     ]
     return "\n".join(lines)
@@ -154,10 +207,7 @@ def main() -> None:
         print(json.dumps(measured(args.run, args.data, args.steps)))
         return
     from splitnerf_tools.bench.provenance import header, provenance
-    from splitnerf_tools.doctor.self_test import failures
 
-    if failed := failures("cpu"):
-        sys.exit(f"nothing is timed, as operators fail their test: {failed}")
     cases = {case: asked(args.run, args.data, args.steps, *case) for case in CASES}
     cases = {case: found for case, found in cases.items() if found is not None}
     facts = provenance(SOURCES, f"python tests/bench/step.py {args.run.name} {args.data.name}")

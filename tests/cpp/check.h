@@ -38,12 +38,6 @@ class Random {
   std::mt19937 engine_;
 };
 
-inline double inner(const std::vector<double>& a, const std::vector<double>& b) {
-  double total = 0;
-  for (size_t i = 0; i < a.size(); ++i) total += a[i] * b[i];
-  return total;
-}
-
 // Equal up to a share of the largest expected number.
 template <class T> void expect_near(const std::vector<T>& got, const std::vector<T>& expected, double tolerance) {
   ASSERT_EQ(got.size(), expected.size());

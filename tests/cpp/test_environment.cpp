@@ -119,11 +119,6 @@ TEST(EnvironmentSampler, DensityIntegratesToOneAndMatchesTheSamples) {
   EXPECT_LT(chi_square, k + 4 * std::sqrt(2 * k));
 }
 
-TEST(EnvironmentSampler, BlackMapSaysSo) {
-  const std::vector<float> map(4 * 8 * 3, 0.f);
-  EXPECT_TRUE(EnvironmentSampler(map.data(), 4, 8).black());
-}
-
 TEST(Environment, NaNStaysAndReadsNothingElse) {
   constexpr int kHeight = 6, kWidth = 10;
   const std::vector<float> map(3 * kHeight * kWidth, 1.f);

@@ -117,21 +117,6 @@ TEST(Sampling, VisibleNormalsMatchTheirDensity) {
   }
 }
 
-TEST(Sampling, VisibleNormalWeightIsSmithsMaskingRatio) {
-  // f (n.l) / pdf without Fresnel is G2 / G1 <= 1, and exactly 1 for a smooth surface.
-  for (uint32_t i = 0; i < 2000; ++i) {
-    const Vec v = sample_cosine_hemisphere(random_unit<double>(i, 0, 1), random_unit<double>(i, 1, 1));
-    const double a = 1e-3 + random_unit<double>(i, 2, 1);
-    const Vec h = sample_ggx_vndf(v, random_unit<double>(i, 3, 1), random_unit<double>(i, 4, 1), a);
-    const Vec l = h * (2 * dot(v, h)) - v;
-    if (l.z <= 0) continue;
-    const double sin2 = h.x * h.x + h.y * h.y;
-    const double weight = ggx_d(a, sin2) * smith_v(a, v.z, l.z) * l.z / pdf_ggx_vndf(v, h, a);
-    EXPECT_LE(weight, 1 + 1e-9);
-    if (a < 2e-3) { EXPECT_NEAR(weight, 1, 1e-2); }
-  }
-}
-
 TEST(Sampling, InversionSolvesItsEquation) {
   for (double t = 1e-14; t < 1e9; t *= 3.7) {
     const double y = invert_y_minus_log1p(t);

@@ -33,15 +33,6 @@ template <class T> void check_log(double tolerance) {
 TEST(VectorMath, LogFloat) { check_log<float>(3e-7); }
 TEST(VectorMath, LogDouble) { check_log<double>(5e-16); }
 
-TEST(VectorMath, SoftplusAndItsSlope) {
-  for (double x = -2.0; x <= 2.0; x += 1e-3) {
-    const Softplus<double> s = softplus_and_slope(x, 100.0);
-    EXPECT_NEAR(s.value, softplus(100.0 * x) / 100.0, 1e-15) << x;
-    EXPECT_NEAR(s.slope, sigmoid(100.0 * x), 1e-15) << x;
-  }
-  EXPECT_TRUE(std::isnan(softplus_and_slope(std::nan(""), 100.0).value));
-}
-
 // A small network with drawn weights, and the same by the plain formula.
 struct Case {
   HashGridShape shape{3, 2, 4, 1.7, 8};

@@ -1,8 +1,7 @@
-// Visibility bits: the search for vertices against brute force, and the sums against plain loops.
+// Visibility bits: vertices that are far, and the sums against plain loops. The search for vertices: tests/reference.py.
 #include "splitnerf/visibility_cache.h"
 
 #include <algorithm>
-#include <map>
 
 #include "check.h"
 #include "meshes.h"
@@ -30,38 +29,6 @@ struct Cloud {
     grids = {vertices.data(), normals.data(), starts.data(), order.data(), kVertices, kBuckets, kLevels, kRadius};
   }
 };
-
-TEST(VertexGrids, NeighboursAreThoseOfBruteForce) {
-  const Cloud cloud(2);
-  Random random(3);
-  int widened = 0, none = 0;
-  for (int trial = 0; trial < 400; ++trial) {
-    const Vec3<double> x{random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6)};
-    const Vec3<double> n = random.direction();
-    std::vector<std::pair<double, int>> expected;
-    double reach = kRadius;
-    for (int level = 0; level < kLevels && expected.empty(); ++level, reach *= 2) {
-      for (int v = 0; v < kVertices; ++v) {
-        const double distance = length(load3(&cloud.vertices[3 * v]) - x);
-        const double weight = neighbour_weight(distance / reach, dot(n, load3(&cloud.normals[3 * v])));
-        if (weight > 1e-6) expected.push_back({weight, v});
-      }
-      widened += expected.empty();
-    }
-    std::sort(expected.rbegin(), expected.rend());
-    if (expected.size() > kMaxNeighbours) expected.resize(kMaxNeighbours);
-    double total = 0;
-    for (const auto& e : expected) total += e.first;
-    const Neighbours<double> found = find_neighbours(cloud.grids, x, n);
-    ASSERT_EQ(found.n, static_cast<int>(expected.size()));
-    none += found.n == 0;
-    std::map<int, double> shares;
-    for (int k = 0; k < found.n; ++k) shares[found.vertex[k]] = found.weight[k];
-    for (const auto& [weight, v] : expected) ASSERT_NEAR(shares[v], weight / total, 1e-12);
-  }
-  EXPECT_GT(widened, 20);
-  EXPECT_GT(none, 5);
-}
 
 TEST(VertexGrids, AFarPointHasNoNeighbours) {
   const Cloud cloud(4);

@@ -66,7 +66,7 @@ def angle(a, b):
 
 def test_normal_map_restores_the_fine_normals(baked):
     """The map in 8 bit, decoded as glTF says, gives the field's normals where the coarse mesh's are off."""
-    asset = baked.asset
+    asset, *_ = baked
     texels = rasterise(asset.uv, asset.triangles, SIZE)
     normal, tangent = (texels.interpolate(values, asset.triangles) for values in (asset.normals, asset.tangents))
     bitangent = np.cross(normal, tangent[:, :3]) * tangent[:, 3:]
@@ -81,7 +81,7 @@ def test_normal_map_restores_the_fine_normals(baked):
 
 
 def test_albedo_and_materials_are_those_of_the_surface(baked):
-    asset = baked.asset
+    asset, *_ = baked
     material = asset.materials[0]
     texels = rasterise(asset.uv, asset.triangles, SIZE)
     normal = texels.interpolate(asset.normals, asset.triangles)
@@ -95,13 +95,13 @@ def test_albedo_and_materials_are_those_of_the_surface(baked):
 
 
 def test_mesh_is_light_closed_and_on_the_surface(baked):
-    asset = baked.asset
-    assert baked.watertight and len(asset.triangles) <= 600
+    asset, occlusion, watertight = baked
+    assert watertight and len(asset.triangles) <= 600
     assert bumpy(torch.from_numpy(asset.vertices)).abs().max() < 1e-4
     welded = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
     welded.merge_vertices(merge_tex=True, merge_norm=True)
     assert welded.is_watertight and welded.volume > 0
-    assert (baked.occlusion > 0.8).all()  # next to convex
+    assert (occlusion > 0.8).all()  # next to convex
     material = asset.materials[0]  # a factor multiplies its texture
     assert material.roughness == material.metallic == 1.0 and tuple(material.albedo) == (1.0, 1.0, 1.0)
 

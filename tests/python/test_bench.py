@@ -1,6 +1,7 @@
 """The benchmarks' own arithmetic: fronts, files, lights, and that a wrong subject is refused before it is timed."""
 
 import csv
+import json
 import math
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 import torch
 from bench import operators, results, split_sum, tables
 from splitnerf.cli import DONE, main
+from splitnerf.config import parse_setting, preset
 from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
 from splitnerf_tools.bench.harness import CheckFailed, interleaved
@@ -198,6 +200,30 @@ def test_scores_are_taken_by_their_keys():
     assert (found["relit, dB"], found["unscaled relit, dB"]) == ("31.3", "30.0")
     assert (found["seconds"], found["steps"]) == ("13", "90")
     assert found["normals, degrees"] == found["albedo, dB"] == ""
+
+
+def test_a_table_of_means_has_a_place_for_each_line_and_column():
+    rows = [row("knot", "8", "refined", relit, seed=seed) for seed, relit in (("0", "30.0"), ("1", "31.0"))]
+    lines = results.table_of_means([*rows, row("rings", "0", "trained", "20.0")], results.PAGES["time"])[2:]
+    assert lines[0] == "| minutes | knot, refined | rings, trained |"
+    assert lines[2:] == ["| 8 | 30.5 / 1.0 | - / - |", "| 0 steps | - / - | 20.0 / 1.0 |"]
+
+
+def test_settings_of_pages_are_known():
+    """Before hours of runs end at the last of them."""
+    for page in results.PAGES.values():
+        for name, _ in page.runs:
+            words = [str(word) for word in results.SETTINGS[name]]
+            base = words[words.index("--preset") + 1] if "--preset" in words else "cpu"
+            preset(base).replace(dict(parse_setting(value) for key, value in zip(words, words[1:]) if key == "--set"))
+
+
+def test_a_late_step_is_timed_without_the_start(tmp_path):
+    """100 steps in the 4 seconds after the 400th; a second of the first ones is the start."""
+    seconds = [*(1 + 0.02 * k for k in range(1, 401)), *(9 + 0.04 * k for k in range(1, 101))]
+    lines = [json.dumps({"step": k, "seconds": at}) for k, at in enumerate(seconds, 1)]
+    (tmp_path / "metrics.jsonl").write_text("\n".join(lines) + "\n")
+    assert results.late_steps(tmp_path) == {"step": 500, "ms": pytest.approx(40.0)}
 
 
 def test_a_page_says_its_rows_and_the_commit_of_the_oldest(monkeypatch, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +48,7 @@ def test_photos_add_the_detail_that_the_fit_cannot_hold(plain, roughness, metall
     true = with_textures(plain, roughness_metallic_texture=gloss, albedo_texture=pattern(texels))
     fitted = with_textures(true, albedo_texture=area_average(albedo_of(true), FINE))
     data = photos(true, sky(), n=12, spp=16, sharpness=5)
-    found = with_detail(data, fitted, sky(), FINE * SIZE)
+    found = with_detail(data, fitted, sky(), FINE * SIZE, math.inf, print)
     rows = rasterise(plain.uv, plain.triangles, FINE * SIZE).index
     in_charts = lambda texture: texture.reshape(-1, 3)[rows]  # noqa: E731
     before, after = (
@@ -64,7 +65,7 @@ def test_what_each_photo_shows_elsewhere_is_not_added(plain):
     noise = np.random.default_rng(0).normal(0, 0.05, data.images.shape[:3])[..., None]
     images = np.stack([data.images[i] for i in range(len(data))])
     images[..., :3] = (images[..., :3] + noise).clip(0, 1)
-    found = with_detail(replace(data, images=images), plain, sky(), FINE * SIZE)
+    found = with_detail(replace(data, images=images), plain, sky(), FINE * SIZE, math.inf, print)
     assert (albedo_of(found) - 0.4).std() < 0.012
 
 

@@ -3,6 +3,8 @@
 import json
 import sys
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,10 +19,8 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, write_image
 from splitnerf.data.truth import ViewTruth, map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
-from splitnerf.evaluate import lpips as ours
-from splitnerf.evaluate import sheet
-from splitnerf.evaluate.lpips import BACKBONE_WEIGHTS, find_distance
-from splitnerf.evaluate.protocol import ScaledView, scaled_scores
+from splitnerf.evaluate import lpips, sheet
+from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, scaled_scores
 from splitnerf.evaluate.score_table import evaluation_table, table_of_lights
 from splitnerf.evaluate.scoring import (
     Evaluated,
@@ -29,8 +29,6 @@ from splitnerf.evaluate.scoring import (
     asset_predictions,
     choose_views,
     evaluate_asset,
-    evaluation_path,
-    is_asset,
     relight,
     relight_scores,
 )
@@ -83,6 +81,25 @@ def views(tmp_path):
         write_image(tmp_path / name, np.ones((4, 8, 3)))
     eye, lens = np.tile(np.eye(4, dtype=np.float32), (5, 1, 1)), np.ones((5, 4), np.float32)
     return Dataset("toy", tmp_path, "test", 1, images, eye, lens, [p.stem for p in paths], paths, np.eye(4))
+
+
+def test_what_is_scored_finds_the_scale_that_was_planted(views):
+    """Of relit views and of the albedo, a factor of its own for each channel, and nearly no error behind it."""
+    factors = np.float32([0.7, 1.6, 1.0])
+    relit = {
+        name: [np.dstack([linear_to_srgb(srgb_to_linear(truth[..., :3]) / factors), truth[..., 3]]) for truth in truths]
+        for name in ("city", "my_sun")
+        for truths in [[read_relit(views, i, name) for i in range(5)]]
+    }
+    relit = {name: [np.round(255 * image).astype(np.uint8) for image in images] for name, images in relit.items()}
+    albedo = np.float32(np.random.default_rng(0).uniform(0.1, 0.5, (SIZE, SIZE, 3)))
+    prediction = {"alpha": np.ones((SIZE, SIZE)), "albedo": albedo / factors}
+    of_albedo = evaluate_maps([prediction], replace(views, images=views.images[:1]), [ViewTruth(albedo=albedo)])[
+        "albedo"
+    ]
+    for scores in (relight_scores(RelitViews(relit, views, 1)), of_albedo):
+        assert scores["lsq"]["scale"] == pytest.approx(factors, rel=0.01) and scores["raw"]["scale"] == [1, 1, 1]
+        assert scores["psnr"] > 45 and scores["raw"]["psnr"] < 25
 
 
 def test_maps_of_the_data_are_those_with_truth(views):
@@ -186,7 +203,7 @@ def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
         (tmp_path / name).mkdir()
         (tmp_path / name / "evaluation.json").write_text(json.dumps(FULL))
     (tmp_path / "old_evaluation.json").write_text(json.dumps(FULL))
-    targets = [str(tmp_path / name) for name in ("chair", "lego", "old.glb")]
+    targets = [str(tmp_path / name) for name in ("chair", "lego", "old.GLB")]
     assert main(["evaluate", *targets, "--table", str(tmp_path / "out.md")]) == DONE
     assert (tmp_path / "out.md").read_text().count("| 27.13 |") == 4
     assert "relit views            PSNR 27.13 dB" in capsys.readouterr().out
@@ -333,12 +350,6 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
     assert evaluate_asset(path, data, Protocol(spp=1, views=1), tmp_path / "environment.hdr").scores["light_psnr"] < 40
 
 
-def test_scores_of_a_file_lie_beside_it():
-    assert evaluation_path(Path("a/chair.glb")) == Path("a/chair_evaluation.json")
-    assert evaluation_path(Path("a/run")) == Path("a/run/evaluation.json")
-    assert is_asset(Path("a.GLB")) and is_asset(Path("a.gltf")) and not is_asset(Path("a.obj"))
-
-
 # ---- the sheet of pictures ----
 
 
@@ -408,84 +419,105 @@ def test_small_pictures_are_enlarged_and_stand_in_their_rows():
 
 
 IMAGE = np.random.default_rng(3).uniform(0, 1, (48, 64, 3)).astype(np.float32)
+CHANNELS = 4, 5, 6, 7, 8  # of the blocks of a small network
 
 
 @pytest.fixture
-def weights(tmp_path, monkeypatch):
-    """Where the backbone's weights belong; nothing is there yet, and whoever reads from a network fails."""
-    monkeypatch.setattr(torch.hub, "_hub_dir", str(tmp_path / "hub"))
-    monkeypatch.setattr("urllib.request.urlopen", lambda *_, **__: pytest.fail("the network was asked"))
-    path = tmp_path / "hub/checkpoints" / BACKBONE_WEIGHTS
-    path.parent.mkdir(parents=True)
-    return path
+def small(tmp_path, monkeypatch) -> Path:
+    """A file of small networks' weights, and the package lpips with heads for them, of which no code runs."""
+    (folder := tmp_path / "lpips/weights/v0.1").mkdir(parents=True)
+    (tmp_path / "lpips/__init__.py").write_text("raise RuntimeError('operator torchvision::nms does not exist')")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "lpips", raising=False)
+    generator, state, n = torch.Generator().manual_seed(0), {}, 3
+    for block, width in zip(lpips.BLOCKS, CHANNELS):
+        for i in block:
+            state[f"features.{i}.weight"] = torch.randn(width, n, 3, 3, generator=generator) / (3 * n**0.5)
+            state[f"features.{i}.bias"] = 0.1 * torch.randn(width, generator=generator)
+            n = width
+    heads = {f"lin{k}.model.1.weight": torch.rand(1, n, 1, 1, generator=generator) for k, n in enumerate(CHANNELS)}
+    torch.save(heads, folder / "vgg.pth")
+    torch.save(state, tmp_path / "vgg16.pth")
+    return tmp_path / "vgg16.pth"
 
 
-class StandIn(torch.nn.Module):
-    """The mean absolute difference, in place of the package's network."""
+def test_the_distance_is_zhangs(small):
+    """By his definition, with torch's own layers: d = sum_l mean_hw |w_l (y_l - y0_l)|^2 of features of unit length."""
+    state, heads = torch.load(small), torch.load(small.parent / "lpips/weights/v0.1/vgg.pth")
+    noise = np.random.default_rng(4).normal(0, 1, IMAGE.shape).astype(np.float32)
+    mean, deviation = (torch.tensor(x)[:, None, None] for x in ([-0.030, -0.088, -0.188], [0.458, 0.448, 0.450]))
 
-    def __init__(self, net, verbose):
-        super().__init__()
-        assert net == "vgg" and not verbose
+    def features(image: np.ndarray) -> list[torch.Tensor]:
+        x, found, i = (torch.from_numpy(image).permute(2, 0, 1)[None] * 2 - 1 - mean) / deviation, [], 0
+        for count in (2, 2, 3, 3, 3):
+            for _ in range(count):
+                layer = torch.nn.Conv2d(x.shape[1], len(state[f"features.{i}.bias"]), 3, padding=1)
+                layer.load_state_dict({part: state[f"features.{i}.{part}"] for part in ("weight", "bias")})
+                x, i = layer(x).detach().relu(), i + 2
+            found.append(torch.nn.functional.normalize(x, dim=1))
+            x, i = torch.nn.MaxPool2d(2)(x), i + 1
+        return found
 
-    def forward(self, x, y):
-        assert x.shape == y.shape == (1, 3, 48, 64) and x.dtype == torch.float32
-        assert min(x.min(), y.min()) < -0.9 and max(x.max(), y.max()) > 0.9  # [-1, 1]
-        return (x - y).abs().mean()[None, None, None, None]
+    distance, sizes = lpips.Lpips(small), []
+    for size in (0.02, 0.1, 0.5):
+        worse = np.clip(IMAGE + size * noise, 0, 1)
+        of_levels = zip(features(worse), features(IMAGE), heads.values())
+        expected = sum(((x - y).square() * w).sum(1).mean() for x, y, w in of_levels).item()
+        sizes.append(distance(worse, IMAGE))
+        assert sizes[-1] == pytest.approx(expected, rel=1e-4)
+    assert 0 == distance(IMAGE, IMAGE) < sizes[0] < sizes[1] < sizes[2]
 
 
-def test_the_distance_is_the_packages(weights, monkeypatch):
-    monkeypatch.setitem(sys.modules, "lpips", SimpleNamespace(LPIPS=StandIn))
-    weights.write_bytes(b"")
-    distance, missing = find_distance()
-    assert missing == "" and distance(IMAGE, IMAGE) == 0.0
-    assert distance(IMAGE, 1 - IMAGE) == pytest.approx(2 * np.abs(2 * IMAGE - 1).mean(), rel=1e-5)
-
-
-def test_what_is_missing_is_said_in_a_line(weights, monkeypatch, tmp_path):
-    """The package, its import, the weights, or weights that can be read."""
+def test_what_is_missing_is_said_in_a_line(small, monkeypatch):
+    """The package, its heads, the weights, weights that can be read, and those of VGG16."""
 
     def refused() -> str:
-        distance, missing = find_distance()
-        assert distance is None and "\n" not in missing
-        return missing
+        with pytest.raises(InputError) as error:
+            lpips.Lpips(small)
+        assert "\n" not in str(error.value)
+        return str(error.value)
 
-    monkeypatch.setitem(sys.modules, "lpips", None)
-    assert refused() == "the package lpips is not installed (pip install 'splitnerf[lpips]')"
-    monkeypatch.delitem(sys.modules, "lpips")
-    (tmp_path / "lpips.py").write_text("raise RuntimeError('operator torchvision::nms\\ndoes not exist')")
-    with monkeypatch.context() as patch:
-        patch.syspath_prepend(tmp_path)
-        line = refused()
-        assert "torchvision::nms does not exist" in line and f"the torchvision of torch {torch.__version__}" in line
-    monkeypatch.setitem(sys.modules, "lpips", SimpleNamespace(LPIPS=StandIn))
-    assert refused() == f"{weights} is missing; it is https://download.pytorch.org/models/{BACKBONE_WEIGHTS}"
-    weights.write_bytes(b"damaged")
-    monkeypatch.setitem(sys.modules, "lpips", SimpleNamespace(LPIPS=lambda **_: torch.load(weights)))
-    assert refused().startswith(f"{weights} cannot be used (")
+    torch.save(torch.load(small) | {"features.28.bias": torch.zeros(9)}, small)
+    assert refused() == f"{small}: is of another network than VGG16; give {lpips.SOURCE}"
+    torch.save({"features.0.weight": torch.zeros(1)}, small)
+    assert refused() == f"{small}: cannot be used for LPIPS ('features.0.bias'); give {lpips.SOURCE}"
+    small.unlink()
+    assert refused().startswith(f"{small}: cannot be used for LPIPS (") and "No such file" in refused()
+    (small.parent / "lpips/weights/v0.1/vgg.pth").write_bytes(b"damaged")
+    assert refused().endswith("; pip install --no-deps lpips")
+    monkeypatch.setattr(lpips, "find_spec", lambda _: None)
+    assert refused() == "--lpips needs the package lpips; pip install --no-deps lpips"
 
 
-def test_a_published_protocol_says_why_it_is_not_there(data, monkeypatch, capsys):
+def test_a_published_protocol_says_that_it_lacks_lpips(data, monkeypatch, capsys):
     """Where relit views were scored, above the paper's own scores."""
     monkeypatch.setattr("splitnerf.cli.evaluate.evaluate_target", lambda *_: FULL)
-    monkeypatch.setattr("splitnerf.evaluate.lpips.find_distance", lambda: (None, "x.pth is missing"))
     for lights, n_methods in (("low", 2), ("high", 0)):
         assert main(["evaluate", "a.glb", "--data", str(data), "--lights", lights]) == DONE
         printed = capsys.readouterr().out
-        assert printed.count("note: LPIPS was not computed: x.pth is missing") == 1
+        assert printed.count("note: LPIPS was not computed; give --lpips vgg16-397923af.pth, from https://") == 1
         assert printed.count("\nSplitNeRF") == n_methods
 
 
-def test_the_packages_own_network(weights):
-    """With weights drawn at random: 0 for equal images, and more for worse ones."""
-    try:
-        import lpips  # noqa: F401
-        from torchvision.models import vgg16
-    except Exception as error:
-        pytest.skip(f"needs lpips and a torchvision of this torch: {error}")
-    torch.manual_seed(0)
-    torch.save(vgg16(weights=None).state_dict(), weights)
-    distance, missing = ours.find_distance()
-    assert missing == "" and distance(IMAGE, IMAGE) == 0.0
-    noise = np.random.default_rng(4).normal(0, 1, IMAGE.shape).astype(np.float32)
-    found = [distance(np.clip(IMAGE + size * noise, 0, 1), IMAGE) for size in (0.02, 0.1, 0.5)]
-    assert 0 < found[0] < found[1] < found[2]
+def test_our_distance_is_that_of_the_package(tmp_path, monkeypatch):
+    """With its own heads, and VGG16 with weights drawn at random."""
+    package = find_spec("lpips")
+    if package is None:
+        pytest.skip("needs the package lpips")
+    generator, layers, n = torch.Generator().manual_seed(0), [], 3
+    for block, width in zip(lpips.BLOCKS, (64, 128, 256, 512, 512)):
+        for _ in block:
+            layers += [torch.nn.Conv2d(n, width, 3, padding=1), torch.nn.ReLU()]
+            torch.nn.init.normal_(layers[-2].weight, 0, (2 / (9 * n)) ** 0.5, generator=generator)
+            n = width
+        layers.append(torch.nn.MaxPool2d(2))
+    vgg16 = torch.nn.Module()
+    vgg16.features = torch.nn.Sequential(*layers)
+    torch.save(vgg16.state_dict(), tmp_path / "vgg16.pth")
+    models = SimpleNamespace(vgg16=lambda pretrained: vgg16)
+    monkeypatch.setitem(sys.modules, "torchvision", SimpleNamespace(models=models))
+    monkeypatch.delitem(sys.modules, "lpips", raising=False)
+    theirs = import_module("lpips").LPIPS(net="vgg", verbose=False)
+    x, y = (torch.from_numpy(i).permute(2, 0, 1)[None] * 2 - 1 for i in (IMAGE, 1 - IMAGE))
+    with torch.no_grad():
+        assert lpips.Lpips(tmp_path / "vgg16.pth")(IMAGE, 1 - IMAGE) == pytest.approx(theirs(x, y).item(), rel=1e-4)

@@ -1,6 +1,7 @@
 """Numbers that are not finite: each is planted once, is named, and costs no checkpoint."""
 
 import itertools
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -202,3 +203,14 @@ def test_the_first_bad_input_is_named_in_order_of_the_data_flow():
         message = f"step 8: the loss is not finite (mask, metal); first not finite: {name} (3 of 3 values); "
         assert explained(i).startswith(message)
     assert "first not finite: none of what it comes from; " in explained(len(names))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cpu", "paper"])
+def test_a_long_training_stays_finite(name, data, tmp_path):
+    """Ten times the steps of a run and more: no loss, parameter or skipped step tells of it."""
+    config = tiny(name, steps=100_000, target_samples=128, n_levels=2, preview_every=1.0)
+    training = train_scene(load_dataset(data), config, tmp_path)
+    assert training.step == 100_000 and training.take_step.skipped == 0
+    assert all(math.isfinite(value) for line in lines_of(tmp_path) for value in line.values())
+    assert all(parameter.isfinite().all() for parameter in training.model.parameters())

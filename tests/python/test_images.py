@@ -11,7 +11,7 @@ from PIL import Image
 from splitnerf.data import images
 from splitnerf.data.environment import read_environment, rotate_environment, sample_environment
 from splitnerf.data.images import write_image
-from splitnerf.data.pixels import averaged_codes, decoded
+from splitnerf.data.pixels import averaged_codes
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
@@ -38,14 +38,6 @@ def test_the_srgb_curve_keeps_shape_and_dtype():
         coded = images.linear_to_srgb(values)
         assert coded.dtype == dtype and coded.shape == (2, 3)
         assert images.srgb_to_linear(coded) == pytest.approx(values, abs=1e-6)
-
-
-def test_photos_are_averaged_by_premultiplied_linear_light():
-    # One opaque white, one opaque black pixel above two transparent red ones: linear 0.5 at coverage 0.5.
-    rgba = np.array([[[1, 1, 1, 1], [0, 0, 0, 1]], [[1, 0, 0, 0], [1, 0, 0, 0]]], dtype=np.float32)
-    result = decoded(averaged_codes(rgba, 2))
-    assert result.shape == (1, 1, 4)
-    assert result[0, 0] == pytest.approx([0.7353570] * 3 + [0.5], abs=1e-5)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])

@@ -306,7 +306,7 @@ def test_a_cap_keeps_its_places_and_normals():
     vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
     leans = dataclasses.replace(surface, materials=leaning)
     sizes = {"n_faces": 0, "texture_size": 128, "spacing": 0.05, "occlusion_offset": 0.01}
-    found = textured_asset("ball", vertices, faces, leans, **sizes, on_surface=mesh.vertices[:, 2] > 0).asset
+    found, *_ = textured_asset("ball", vertices, faces, leans, **sizes, on_surface=mesh.vertices[:, 2] > 0)
     radius, up = np.linalg.norm(found.vertices, axis=1), found.vertices[:, 2]
     assert radius[up > 0.1] == pytest.approx(0.8, abs=1e-4) and radius[up < -0.01] == pytest.approx(0.82, abs=1e-6)
     tilt = (found.normals * found.vertices).sum(1) / radius

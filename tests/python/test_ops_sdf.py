@@ -21,7 +21,7 @@ from op_checks import DEVICES, check_error, generator, grad_leaves, lib, on_thre
 from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, march_rays, surface_weights
 from splitnerf.ops.rays import CELL_EMPTY
-from splitnerf.ops.sdf import SdfNetwork, sample_rays, sdf_values
+from splitnerf.ops.sdf import SdfNetwork, sample_rays
 
 
 def sampled(field, rays: tuple, cells: torch.Tensor | None = None, **settings) -> tuple:
@@ -139,16 +139,6 @@ def test_where_the_field_is_steeper_than_promised_the_walk_goes_back():
     assert steepest > 1.5 and faint.max() < 4e-3
 
 
-@pytest.mark.parametrize("n", [63, 64, 1000])
-def test_values_are_the_field(n):
-    field = bumpy_field()
-    x = 4 * torch.rand(n, 3, generator=generator(), dtype=torch.float64) - 2
-    expected = field.sdf(x).detach()
-    torch.testing.assert_close(sdf_values(x, field.network()), expected)
-    single = sdf_values(x.float(), field.float().network())
-    torch.testing.assert_close(single.double(), expected, rtol=1e-5, atol=2e-6)
-
-
 def test_empty_cells_are_not_asked():
     samples, evaluated, _ = sampled(bumpy_field(), field_rays(), torch.full_like(full_cells(), CELL_EMPTY))
     assert len(samples.t_starts) == 0 and int(evaluated.sum()) == 0
@@ -231,15 +221,6 @@ def test_an_impossible_shape_raises(name, value):
     check_error(lambda: HashGridSpec(**{name: value}), "finest level" if value == 2**40 else name, "got")
 
 
-def test_module_opens_levels_one_by_one():
-    grid = HashGrid(HASH_SPEC, init_scale=1.0)
-    x = torch.rand(5, 3)
-    full = grid(x)
-    assert grid.stored() is None
-    grid.n_active = 1
-    assert torch.equal(grid(x)[:, :2], full[:, :2]) and not grid(x)[:, 2:].any()
-
-
 def exact_inputs(device, n: int = 200) -> tuple:
     """Positions and a table of multiples of 1/64 in [-1, 1], which float32 and float16 both have."""
     positions, table, *_ = hash_inputs(device, torch.float32, n)
@@ -320,18 +301,6 @@ def test_the_module_reads_a_copy_that_follows_the_parameter():
     assert not torch.equal(check(), second)
     grid.table = torch.nn.Parameter(torch.rand(HASH_SPEC.n_entries, 2))
     check()
-
-
-def test_what_16_bits_cannot_hold_becomes_their_largest_number():
-    grid = HashGrid(HASH_SPEC, table_dtype=torch.float16)
-    beyond = [65504.0, 65519.9, 65520.0, 1e30, 3.4e38, float("inf"), 65504.0, 1e-30]
-    with torch.no_grad():
-        grid.table[:8, 0], grid.table[:8, 1] = torch.tensor(beyond), -torch.tensor(beyond)
-        grid.table[8, 0] = float("nan")
-    stored = grid.stored()[:9]
-    assert stored[:8].isfinite().all() and stored[8, 0].isnan()
-    assert stored[:8, 0].tolist() == [65504.0] * 7 + [0.0]
-    assert torch.equal(stored[:8, 1], -stored[:8, 0])
 
 
 def exact_field(table_dtype=None) -> SdfField:

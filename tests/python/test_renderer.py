@@ -30,7 +30,7 @@ def rendered(model: SceneModel, found, **options) -> RenderedRays:
 def test_gradients_of_a_picture_are_its_derivatives():
     """To the field, its sharpness, the materials and the light, each along a random direction, of colours and coverage."""
     model, _ = ball()
-    model.light = LightMlp(16, 2, 2, 2)
+    model.light = LightMlp(16, 2, 2, 2, "softplus")
     with torch.no_grad():
         model.light.out.weight.normal_()
         for p in model.sdf_field.parameters():
@@ -207,12 +207,13 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     torch.testing.assert_close(x[candidates[:n_rays]], torch.full((n_rays,), 0.5), rtol=0, atol=0.05)
 
 
-def test_a_view_is_made_of_the_rays_of_its_pixels():
+def test_a_view_is_made_of_the_rays_of_its_pixels(monkeypatch):
     """Half a sample into each ray's lattice, whatever the number of rays at a time, in an image wider than high."""
     model, cells = ball(occlusion_channels=3)
     height, width, lens = 14, 26, LENS + torch.tensor([-12.0, -8.0, 3.0, -4.5])
     maps = render_view(model, cells, POSE, lens, height, width)
-    parts = render_view(model, cells, POSE, lens, height, width, chunk=37)
+    monkeypatch.setattr("splitnerf.render.renderer.CHUNK", 37)
+    parts = render_view(model, cells, POSE, lens, height, width)
     for name in maps:
         assert torch.equal(maps[name], parts[name]) and maps[name].shape[:2] == (height, width), name
     fx, fy, cx, cy = lens.tolist()

@@ -22,6 +22,7 @@ FEWER = {
     "NormalEquations.step": 2400,
     "LightEquations.step": 600,
     "PhotoExposures.learn": 4800,
+    "find_exposures": 1920,
 }
 BY_NAME = {entry.name: entry for entry in table.ENTRIES}
 NAN, INF = math.nan, math.inf

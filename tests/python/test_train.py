@@ -231,12 +231,13 @@ def test_refinement_is_said_with_what_it_begins_from(data, tmp_path, monkeypatch
     assert said == [f"stage {number} of 4: {name}" for number, name in enumerate(names, 1)]
 
 
-def test_stages_say_how_long_the_rest_takes_by_the_trainings_own_clock(monkeypatch, capsys):
-    monkeypatch.setattr("splitnerf.cli.common.time", Mock(monotonic=iter([0.0, 424.4, 600.0]).__next__))
+@pytest.mark.parametrize("end, last", [(600.0, "10:00 minutes"), (470.0, "7:50 of 8:40 minutes")])
+def test_stages_say_how_long_the_rest_takes_by_the_trainings_own_clock(end, last, monkeypatch, capsys):
+    monkeypatch.setattr("splitnerf.cli.common.time", Mock(monotonic=iter([0.0, 424.4, end]).__next__))
     stages, training = Stages(), Mock(started=40.0, finished=False, **{"config.run.max_minutes": 8.0})
     for kind in ("begun", "refinement", "evaluation"):
         stages(Mock(kind=kind, training=training))
-    said = ["refinement, after 7:04 minutes and 1:36 to come", "evaluation, after 10:00 minutes"]
+    said = ["refinement, after 7:04 minutes and 1:36 to come", f"evaluation, after {last}"]
     assert capsys.readouterr().err.splitlines()[1:] == [f"stage {i} of 4: {words}" for i, words in enumerate(said, 3)]
 
 

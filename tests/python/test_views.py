@@ -105,7 +105,7 @@ def test_maps_are_means_by_what_their_samples_weigh():
 
 
 def test_in_srgb_no_sample_is_brighter_than_white():
-    """Of what is composited each sample is clipped by itself, as published."""
+    """Of what is composited each sample is clipped by itself, as in the released code."""
     model, cells = ball(compositing="srgb")
     model.material = Given(lambda x, *_: (torch.ones(len(x), 3), torch.ones(len(x), 1), torch.zeros(len(x), 1)))
     with torch.no_grad():

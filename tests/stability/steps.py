@@ -3,6 +3,7 @@
 from functools import lru_cache
 from types import SimpleNamespace
 
+import numpy as np
 import torch
 from splitnerf.config import Config, preset
 from splitnerf.ops._library import lib
@@ -23,6 +24,7 @@ from splitnerf.training.exposure import (
     PhotoExposures,
     shrunk,
 )
+from splitnerf_tools.capture.photometry import find_exposures
 from torch import Tensor
 
 from stability.cases import Draw
@@ -32,7 +34,7 @@ from stability.properties import Property
 LR, DECAY, BETAS, EPS = 1e-2, 1e-2, (0.9, 0.99), 1e-8
 LONG_RUN = 100_000  # steps
 TEXELS = 24  # of one system
-PHOTOS = 6
+PHOTOS, POINTS = 6, 40
 
 
 def draw_moments(draw: Draw, n: int) -> Rows:
@@ -166,6 +168,16 @@ def exposures_found(draw: Draw, n: int) -> tuple[Tensor, Rows]:
     return worst, {"exposures": starts.float(), "photo": photo, "mean": mean}
 
 
+def gains_found(draw: Draw, n: int) -> tuple[Tensor, Rows]:
+    """Photographs' gains from points that all show, at some places black, clipped, or nearly so."""
+    gains, light = draw.logarithmic(0.33, 3, n, PHOTOS), draw.logarithmic(0.04, 0.25, n, POINTS)
+    values = draw.mixed((0.0, 1e-30, 1.0), gains[:, :, None] * light[:, None], 0.2)
+    photo, point = np.divmod(np.arange(PHOTOS * POINTS), POINTS)
+    rest, expected = (np.zeros(len(photo)), np.full(PHOTOS, np.nan)), gains.log() - gains.log().mean(1, keepdim=True)
+    found = [find_exposures(photo, point, of_case.flatten().numpy(), *rest).gains for of_case in values]
+    return (torch.from_numpy(np.log(found)) - expected).abs().amax(1) - 1e-3, {"values": values}
+
+
 ENTRIES = (
     Entry(
         "adamw_steps_",
@@ -203,6 +215,13 @@ PROPERTIES = (
         exposures_found,
         "the factors of the closed form to 1e-5; their mean stays",
         size=8 * PHOTOS,
+        most=10**6,
+    ),
+    Property(
+        "find_exposures",
+        gains_found,
+        "the gains that the values were made with, to 1e-3",
+        size=PHOTOS * POINTS,
         most=10**6,
     ),
 )

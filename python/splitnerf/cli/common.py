@@ -175,9 +175,13 @@ class Stages:
                 self._say("training", f" on {where}; in all {ends}; results go to {plain(str(training.run))}")
         elif event.kind in self._names:
             now = time.monotonic()
-            spent, left = round(now - self._started), round(self._end - now)
-            to_come = " and {}:{:02d} to come".format(*divmod(left, 60)) if left > 0 else ""
-            self._say(event.kind, ", after {}:{:02d} minutes".format(*divmod(spent, 60)) + to_come)
+            spent, left = round(now - self._started), max(0, round(self._end - now))
+            minutes = ["{}:{:02d}".format(*divmod(seconds, 60)) for seconds in (spent, left, spent + left)]
+            done, of_all = event.kind == "evaluation", left > 0
+            more = (
+                f" of {minutes[2]} minutes" if done and of_all else " minutes" + f" and {minutes[1]} to come" * of_all
+            )
+            self._say(event.kind, f", after {minutes[0]}{more}")
 
     def _say(self, name: str, more: str) -> None:
         print(f"stage {self._names.index(name) + 1} of {len(self._names)}: {name}{more}", file=sys.stderr, flush=True)

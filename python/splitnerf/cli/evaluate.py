@@ -8,7 +8,7 @@ from pathlib import Path
 from splitnerf.cli.common import DONE, add_reading_options, examples, print_scores, reading_of
 from splitnerf.errors import InputError
 
-NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env")
+NEEDS_DATA = ("out", "sheet", "views", "lights", "maps", "env", "lpips")
 
 
 def add_parser(commands: argparse._SubParsersAction) -> None:
@@ -60,6 +60,12 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
         metavar="MAP",
         help="the light of the photos, for a GLB file (default: the environment.exr or .hdr in its folder)",
     )
+    add(
+        "--lpips",
+        type=Path,
+        metavar="VGG16.pth",
+        help="compute LPIPS, too, with these weights; needs the package lpips",
+    )
     add("--out", type=Path, metavar="FILE.json", help="where to write the scores of one RUN; leaves RUN untouched")
     add("--table", type=Path, metavar="OUT.md", help="write all scores as a markdown table, with their mean")
     add("--sheet", type=Path, metavar="SHEET.png", help="write pictures of one RUN: truth, prediction, error")
@@ -68,7 +74,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     check_usage(args)
-    from splitnerf.evaluate.lpips import find_distance
+    from splitnerf.evaluate.lpips import SOURCE
     from splitnerf.evaluate.scoring import read_evaluation
     from splitnerf.run_folder import refuse_no_run
 
@@ -90,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
             print(table_of_lights(scores, scene_name(target)))
         if args.lights and scores["relight"]["lpips"] is None:
-            print(f"note: LPIPS was not computed: {find_distance()[1]}")
+            print(f"note: LPIPS was not computed; give --lpips {Path(SOURCE).name}, from {SOURCE}")
     if args.table:
         from splitnerf.evaluate.score_table import evaluation_table
         from splitnerf.files import atomic_path
@@ -141,7 +147,7 @@ def evaluate_target(target: Path, data: Path, args: argparse.Namespace) -> dict:
 
     _, trained_at = data_of(target if target.is_dir() else target.parent) or (None, 1)
     downscale = trained_at if args.downscale is None else args.downscale
-    protocol = Protocol(downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target))
+    protocol = Protocol(downscale, args.views, args.spp, args.lights, args.maps, reading_of(args, target), args.lpips)
     if is_asset(target):
         evaluated = evaluate_asset(target, data, protocol, args.env)
         write_json(args.out or evaluation_path(target), evaluated.scores)

@@ -219,20 +219,11 @@ class Dataset:
         views = list(views)
         if views == list(range(len(self))):
             return self
-        return replace(
-            self,
-            images=self.images.select(views),
-            known=None if self.known is None else self.known[views],
-            sizes=self.sizes[views],
-            light_turns=None if self.light_turns is None else self.light_turns[views],
-            poses=self.poses[views],
-            intrinsics=self.intrinsics[views],
-            exposures=self.exposures[views],
-            stated=self.stated[views],
-            frame_names=[self.frame_names[i] for i in views],
-            image_paths=[self.image_paths[i] for i in views],
-            behind_paths=[self.behind_paths[i] for i in views],
-        )
+        arrays = ("known", "sizes", "light_turns", "poses", "intrinsics", "exposures", "stated")
+        chosen = {name: x if (x := getattr(self, name)) is None else x[views] for name in arrays}
+        for name in ("frame_names", "image_paths", "behind_paths"):
+            chosen[name] = [getattr(self, name)[i] for i in views]
+        return replace(self, images=self.images.select(views), **chosen)
 
 
 def load_dataset(

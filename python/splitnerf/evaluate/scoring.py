@@ -28,7 +28,7 @@ from splitnerf.data.truth import (
     relight_maps,
 )
 from splitnerf.errors import InputError
-from splitnerf.evaluate.lpips import Distance, find_distance
+from splitnerf.evaluate.lpips import Distance, Lpips
 from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, scaled_scores
 from splitnerf.evaluate.score_table import COLUMNS
 from splitnerf.progress import tracked
@@ -53,6 +53,7 @@ class Protocol:
         lights: "low" or "high" for a published relighting protocol, else None.
         maps: Folder of environment maps; None for those of the data.
         reading: How the data are read.
+        lpips: A file of VGG16's weights, with which LPIPS is computed; None: it is not.
     """
 
     downscale: int = 1
@@ -61,10 +62,15 @@ class Protocol:
     lights: str | None = None
     maps: Path | None = None
     reading: Reading = Reading()
+    lpips: Path | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.spp <= MOST_SPP:
             raise InputError(f"--spp must be at least 1 and at most {MOST_SPP}, got {self.spp}")
+
+    def distance(self) -> Distance | None:
+        """LPIPS, where it is computed. Raises InputError where its files cannot be used."""
+        return None if self.lpips is None else Lpips(self.lpips)
 
 
 @dataclass
@@ -168,12 +174,13 @@ def environment_beside(path: Path) -> Path | None:
 def evaluate_asset(path: Path, data: Path, protocol: Protocol, env: Path | None = None) -> Evaluated:
     """Scores a GLB file, in the data's world frame, against the test views of a dataset; `env` is the light of the
     photos, None for the environment.exr or .hdr in the file's folder. Raises InputError where a file cannot be used."""
-    asset = read_asset(path)
+    asset, distance = read_asset(path), protocol.distance()
     split = "test" if has_test_split(data, protocol.reading) else "train"
     views, maps = choose_views(load_dataset(data, split, protocol.downscale, protocol.reading), protocol)
     env = environment_beside(path) if env is None else env
     check_place(path.parent, views.origin)
-    return score_asset(asset, None if env is None else read_environment(env), views, maps, protocol.spp)
+    light = None if env is None else read_environment(env)
+    return score_asset(asset, light, views, maps, protocol.spp, distance=distance)
 
 
 def score_asset(
@@ -184,6 +191,7 @@ def score_asset(
     spp: int,
     seconds: float | None = None,
     free_exposure: bool = False,
+    distance: Distance | None = None,
 ) -> Evaluated:
     """Scores an asset, in the data's world frame, by path tracing.
 
@@ -192,11 +200,12 @@ def score_asset(
         maps: Environment maps for relit views, by name; none for no such views.
         seconds: The time that the asset took, to record.
         free_exposure: Whether each photo has an exposure of its own, which is fitted.
+        distance: LPIPS; None: it is not computed.
     """
     renderer = AssetRenderer(asset)
     predictions = asset_predictions(renderer, views, environment, spp)
     relit = relight(renderer, views, maps, spp)
-    evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure)
+    evaluated = _scored(predictions, views, environment, asset_mesh(asset), relit, seconds, free_exposure, distance)
     return replace(evaluated, scores=evaluated.scores | {"scored": "asset", "spp": spp})
 
 
@@ -210,6 +219,7 @@ def score_fields(
     spp: int,
     seconds: float,
     free_exposure: bool = False,
+    distance: Distance | None = None,
 ) -> Evaluated:
     """Scores trained fields by rendering them; arguments as for :func:`score_asset`, with the surface `mesh` in the
     data's world frame (None: that of the asset), and what was exported, which the relit views show, or None."""
@@ -217,7 +227,7 @@ def score_fields(
     light = model.light.panorama(ENVIRONMENT_ROWS).cpu().numpy()
     relit = None if asset is None else relight(AssetRenderer(asset), views, maps, spp)
     mesh = asset_mesh(asset) if mesh is None and asset is not None else mesh
-    evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure)
+    evaluated = _scored(predictions, views, light, mesh, relit, round(seconds, 1), free_exposure, distance)
     return replace(evaluated, scores=evaluated.scores | {"scored": "fields"})
 
 
@@ -229,11 +239,12 @@ def _scored(
     relit: RelitViews | None,
     seconds: float | None,
     free_exposure: bool,
+    distance: Distance | None,
 ) -> Evaluated:
     """Scores rendered views, a light and a mesh against the truth of the data, and relit views."""
     if free_exposure and light is not None:
         views = exposed_like(views, predictions)
-    truths, truth, distance = load_view_truths(views), load_scene_truth(views.root, views.origin), find_distance()[0]
+    truths, truth = load_view_truths(views), load_scene_truth(views.root, views.origin)
     relit_scores = None if relit is None else relight_scores(relit, distance)
     scores = evaluate_maps(
         predictions, views, truths, light, truth.light, mesh, truth.mesh, seconds, relit_scores, distance

@@ -148,7 +148,7 @@ def write_assets(
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
         n_textured, watertight, (origin, scale) = len(faces), is_closed(faces), placing.of(mesh.vertices)
         if set(formats) - {"ply"}:
-            textured = textured_asset(
+            asset, occlusion, watertight = textured_asset(
                 name,
                 vertices,
                 faces,
@@ -161,11 +161,9 @@ def write_assets(
                 tell=lambda share, part: bar.show(0.1 + 0.8 * share, f"export, {part}"),
             )
             bar.show(0.9, "export, files")
-            asset = dataclasses.replace(
-                textured.asset, vertices=transform_points(world_from_box, textured.asset.vertices)
-            )
-            origin, scale = write_textured(out, formats, asset, textured.occlusion, placing)
-            n_textured, watertight = len(asset.triangles), textured.watertight
+            asset = dataclasses.replace(asset, vertices=transform_points(world_from_box, asset.vertices))
+            origin, scale = write_textured(out, formats, asset, occlusion, placing)
+            n_textured = len(asset.triangles)
         if "ply" in formats:
             placed = trimesh.Trimesh((mesh.vertices - origin) * scale, faces, process=False)
             write_mesh_ply(out / "mesh.ply", placed, surface_materials(surface, vertices)[0])

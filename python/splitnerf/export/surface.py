@@ -28,13 +28,6 @@ class Surface:
 
 
 @torch.no_grad()
-def surface_normals(surface: Surface, points: np.ndarray) -> np.ndarray:
-    """Unit gradients [n, 3] float32 of the field at [n, 3] points; 0 where it has none."""
-    rows = [F.normalize(surface.gradient(chunk)[1], dim=1) for chunk in torch.from_numpy(points).split(CHUNK)]
-    return torch.cat(rows).numpy()
-
-
-@torch.no_grad()
 def surface_materials(surface: Surface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """albedo [n, 3], roughness [n], metallic [n] and normals [n, 3] float32 at [n, 3] points. Raises RuntimeError where
     one of them is not finite."""

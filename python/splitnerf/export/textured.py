@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+import torch
 import trimesh
 import xatlas
 from scipy.spatial import cKDTree
+from torch.nn import functional as F
 
 from splitnerf.data.asset import Asset, vertex_tangents
 from splitnerf.devices import refuse_one_processor
 from splitnerf.export.bake import bake
 from splitnerf.export.simplify import decimate, is_closed
-from splitnerf.export.surface import Surface, surface_normals, to_level_set
+from splitnerf.export.surface import CHUNK, Surface, to_level_set
 
 PADDING = 4  # texels between charts as packed, 2 at least in the texture: the packed area is up to twice as large
 CHARTS = 64  # no chart has more than 1 / CHARTS of the surface: its time rises with the square of its faces
 MIN_AGREEMENT = 0.2  # least cosine between the field's and the faces' normal; below it the faces' normal is used
-
-
-@dataclass(frozen=True)
-class TexturedAsset:
-    """An asset in the surface's frame with baked textures, its occlusion [h, w] in [0, 1], 1 = open, and whether the
-    mesh was closed before the charts cut it."""
-
-    asset: Asset
-    occlusion: np.ndarray
-    watertight: bool
 
 
 def textured_asset(
@@ -43,7 +35,7 @@ def textured_asset(
     occlusion_offset: float,
     on_surface: np.ndarray | None = None,
     tell: Callable[[float, str], None] = lambda share, what: None,
-) -> TexturedAsset:
+) -> tuple[Asset, np.ndarray, bool]:
     """Decimates a mesh, moves its vertices back onto the surface, unwraps it and bakes its textures.
 
     Args:
@@ -56,6 +48,10 @@ def textured_asset(
         on_surface: [n] bool, the vertices that are of the zero level set. The others, a cap's, stay where they are,
             with the mesh's normals. None: all.
         tell: Called before each part with the share of the time that is used by then, about, and the part's name.
+
+    Returns:
+        The asset in the surface's frame with baked textures, its occlusion [h, w] in [0, 1], 1 = open, and whether the mesh was
+        closed before the charts cut it.
 
     Raises:
         RuntimeError: The texture is too small, or a field is not finite.
@@ -72,20 +68,13 @@ def textured_asset(
     tell(0.2, "texture coordinates")
     origins, faces, uv = unwrap(vertices, faces, texture_size)
     vertices, normals, on_surface = vertices[origins], normals[origins], on_surface[origins]
-    asset = Asset(
-        name=name,
-        vertices=vertices,
-        triangles=faces,
-        normals=normals,
-        material_ids=np.zeros(len(faces), np.int32),
-        uv=uv,
-        tangents=vertex_tangents(vertices, faces, normals, uv),
-    )
+    tangents, of_one = vertex_tangents(vertices, faces, normals, uv), np.zeros(len(faces), np.int32)
+    asset = Asset(name, vertices, faces, normals, of_one, uv=uv, tangents=tangents)
     tell(0.7, "textures")
     material, occlusion = bake(
         asset, surface, texture_size, reach=reach, offset=occlusion_offset, on_surface=on_surface
     )
-    return TexturedAsset(replace(asset, materials=[material]), occlusion, watertight)
+    return replace(asset, materials=[material]), occlusion, watertight
 
 
 def vertex_normals(
@@ -93,7 +82,9 @@ def vertex_normals(
 ) -> np.ndarray:
     """[n, 3] float32 unit gradients of the field at the vertices; the faces' normals where the two disagree, and where
     vertices are not on its level set."""
-    fine = surface_normals(surface, vertices)
+    with torch.no_grad():
+        chunks = torch.from_numpy(vertices).split(CHUNK)
+        fine = torch.cat([F.normalize(surface.gradient(chunk)[1], dim=1) for chunk in chunks]).numpy()
     coarse = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, dtype=np.float32)
     agree = ((fine * coarse).sum(axis=1, keepdims=True) > MIN_AGREEMENT) & np.reshape(on_surface, (-1, 1))
     known = np.linalg.norm(coarse, axis=1, keepdims=True) > 0.5

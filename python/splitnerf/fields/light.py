@@ -242,12 +242,7 @@ class LightMlp(Light):
     """
 
     def __init__(
-        self,
-        width: int = 256,
-        n_layers: int = 5,
-        direction_frequencies: int = 10,
-        roughness_frequencies: int = 5,
-        activation: str = "softplus",
+        self, width: int, n_layers: int, direction_frequencies: int, roughness_frequencies: int, activation: str
     ):
         super().__init__()
         self.activation = activation

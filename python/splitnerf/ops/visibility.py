@@ -142,13 +142,7 @@ RADIUS_IN_SPACINGS = 1.5
 
 @front()
 def visibility_bits(
-    scene: MeshScene,
-    positions: Tensor,
-    normals: Tensor,
-    directions: Tensor,
-    offset: float = 0.0125,
-    *,
-    with_hits: bool = False,
+    scene: MeshScene, positions: Tensor, normals: Tensor, directions: Tensor, offset: float, *, with_hits: bool = False
 ) -> tuple[Tensor, Tensor]:
     """Traces the same directions from every vertex of a mesh and records whether each ray is blocked.
 

@@ -13,7 +13,6 @@ Photos held out then say, window by window, whether they show what was added, to
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -229,12 +228,7 @@ def mean_light(light: np.ndarray, turns: np.ndarray | None) -> Tensor:
 
 @torch.no_grad()
 def with_detail(
-    dataset: Dataset,
-    asset: Asset,
-    light: np.ndarray,
-    size: int,
-    seconds: float = math.inf,
-    show: Callable[[float], None] = lambda share: None,
+    dataset: Dataset, asset: Asset, light: np.ndarray, size: int, seconds: float, show: Callable[[float], None]
 ) -> Asset:
     """The asset with an albedo texture as fine as the photos.
 

@@ -262,14 +262,7 @@ def forget_state(folder: Path) -> None:
 
 
 def refine_run(
-    run: Path,
-    data: Path,
-    out: Path,
-    *,
-    downscale: int,
-    settings: FitSettings,
-    resume: bool = False,
-    reading: Reading = Reading(),
+    run: Path, data: Path, out: Path, *, downscale: int, settings: FitSettings, resume: bool, reading: Reading
 ) -> Refined | None:
     """Refines what training exported into a run, or another asset that stands where its photos are; see
     :func:`refine_folder`."""

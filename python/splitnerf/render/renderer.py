@@ -21,6 +21,7 @@ from splitnerf.render.rays import image_rays
 
 MAX_SAMPLES_PER_RAY = 1024
 MIN_OPACITY = 1e-4
+CHUNK = 8192  # rays of a view rendered at a time
 PHASES = 1024.0
 SURFACE_GAP = 2.5  # in steps; two samples farther apart may lie on two surfaces
 
@@ -294,32 +295,24 @@ def render_rays(
 
 @torch.no_grad()
 def render_view(
-    model: SceneModel,
-    cells: Tensor,
-    pose: Tensor,
-    intrinsics: Tensor,
-    height: int,
-    width: int,
-    chunk: int = 8192,
-    turn: Tensor | None = None,
+    model: SceneModel, cells: Tensor, pose: Tensor, lens: Tensor, height: int, width: int, turn: Tensor | None = None
 ) -> dict[str, Tensor]:
     """Renders a whole view with its maps.
 
     Args:
         cells: [r, r, r] uint8 cells of the occupancy grid.
         pose: [4, 4] camera-to-world, OpenGL axes, internal frame.
-        intrinsics: [4] fx, fy, cx, cy in pixels.
+        lens: [4] fx, fy, cx, cy in pixels.
         height, width: The image's size in pixels.
-        chunk: Rays rendered at a time.
         turn: [3, 3] the rotation of directions into the light's frame; None where the light stands still.
 
     Returns:
         rgb [H, W, 3] sRGB un-premultiplied in [0, 1], alpha [H, W], albedo [H, W, 3] linear, roughness, metallic,
         occlusion_d, occlusion_s [H, W], normal [H, W, 3] unit, world.
     """
-    rays_o, rays_d = image_rays(pose, intrinsics, height, width)
+    rays_o, rays_d = image_rays(pose, lens, height, width)
     light, rows = model.evaluate_light(), []
-    for o, d in zip(rays_o.split(chunk), rays_d.split(chunk)):
+    for o, d in zip(rays_o.split(CHUNK), rays_d.split(CHUNK)):
         found = find_samples(model, cells, o, d, torch.full_like(o[:, 0], 0.5))
         ray = render_rays(model, light, found, turns=None if turn is None else turn.expand(len(o), 3, 3))
         p = ray.points

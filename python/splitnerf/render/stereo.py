@@ -100,7 +100,7 @@ def depth_maps(photos: GreyPhotos, hull: Tensor, box: float, most: int = MOST_VI
     for i in spread_out(len(photos.grey), most).tolist():
         rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
         first, last = (x.view_as(photos.grey[i]) for x in _limits(*rays, cells, box))
-        maps.append(_swept(photos, i, rays, first, last - first, STEP))
+        maps.append(_swept(photos, i, first, last - first, STEP))
     return tuple(torch.stack(x) for x in zip(*maps))
 
 
@@ -119,25 +119,18 @@ def refined_depths(
     """
     maps = []
     for i in spread_out(len(photos.grey), most).tolist():
-        rays = image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
         span = torch.where(base[i] > 0, 2 * reach, 0.0)
-        maps.append(_swept(photos, i, rays, base[i] - reach, span, step, base)[:2])
+        maps.append(_swept(photos, i, base[i] - reach, span, step, base)[:2])
     return tuple(torch.stack(x) for x in zip(*maps))
 
 
 def _swept(
-    photos: GreyPhotos,
-    i: int,
-    rays: tuple[Tensor, Tensor],
-    first: Tensor,
-    span: Tensor,
-    step: float,
-    base: Tensor | None = None,
+    photos: GreyPhotos, i: int, first: Tensor, span: Tensor, step: float, base: Tensor | None = None
 ) -> tuple[Tensor, Tensor, Tensor]:
     """The depths, scores and margins [h, w] of one photo, compared from depths `first` [h, w] over `span` [h, w], which
     is 0 where there is nothing to compare. A photo counts as unlike where its own surface, of depths `base` [n, h, w],
     hides the middle of the span."""
-    grey, (rays_o, rays_d) = photos.grey[i], rays
+    grey, (rays_o, rays_d) = photos.grey[i], image_rays(photos.poses[i], photos.intrinsics[i], *photos.grey.shape[1:])
     (height, width), near = grey.shape, _neighbours(photos.poses, i)
     depths, scores, margins = torch.zeros_like(grey), torch.full_like(grey, -1.0), torch.zeros_like(grey)
     inside = photos.masks[i] & (span > 0)

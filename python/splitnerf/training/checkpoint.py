@@ -19,6 +19,8 @@ from splitnerf.render.seen import Cameras
 from splitnerf.training.start import HELD_UNTIL, StartShape
 
 FORMAT = 2
+KINDS = {dict: "config model optimiser", str: "fingerprint", int: "step n_rays", bool: "stopped"}
+KINDS[float] = "seconds meshed_at previewed_at"
 LARGEST = {"step": 1e12, "seconds": 1e12, "meshed_at": 1.0, "previewed_at": 1.0}
 MOMENTS = ("exp_avg", "exp_avg_sq")
 CACHED_LIGHT = {"sky", "aims", "sent", "emitters"}
@@ -167,21 +169,10 @@ def restored_grid(grid: OccupancyGrid, content: dict, path: Path) -> tuple[Tenso
 
 def _check_content(content: dict) -> None:
     """Raises ValueError or InputError where a value is not what the trainer writes."""
-    kinds = {
-        "config": dict,
-        "fingerprint": str,
-        "step": int,
-        "seconds": float,
-        "n_rays": int,
-        "meshed_at": float,
-        "previewed_at": float,
-        "stopped": bool,
-        "model": dict,
-        "optimiser": dict,
-    }
-    for key, kind in kinds.items():
-        if not isinstance(content.get(key), kind):
-            raise ValueError(f"{key} is missing or of another type")
+    for kind, keys in KINDS.items():
+        for key in keys.split():
+            if not isinstance(content.get(key), kind):
+                raise ValueError(f"{key} is missing or of another type")
     for key, largest in LARGEST.items():
         if not 0 <= content[key] <= largest:
             raise ValueError(f"{key} is {content[key]}")

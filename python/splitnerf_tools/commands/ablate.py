@@ -38,6 +38,7 @@ def add_parser(commands: argparse._SubParsersAction) -> None:
     add("--spp", type=int, default=32, metavar="N", help="paths a pixel of relit views (default: 32)")
     add("--lights", choices=["low", "high"], help="a published relighting protocol, 20 views; see evaluate")
     add("--maps", type=Path, metavar="FOLDER", help="folder of maps that DATA has relit images of")
+    add("--lpips", type=Path, metavar="VGG16.pth", help="compute LPIPS, too; see evaluate")
     add("--preset", choices=["cpu", "paper"], default="cpu", help="the full method (default: cpu)")
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings", help="change a setting of all rows")
     parser.set_defaults(execute=run)
@@ -82,9 +83,10 @@ def run(args: argparse.Namespace) -> int:
             with atomic_path(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
 
-    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps)
+    protocol = Protocol(args.downscale, args.views, args.spp, args.lights, args.maps, lpips=args.lpips)
     plan = AblationPlan(list(scenes.values()), rows, args.seeds, protocol, args.out)
     refuse_data(args.out)
+    protocol.distance()
     refuse_others(tables[0], b"scene,row,seed,", tables[1])
     for scene in plan.scenes:  # before the first is trained on
         read_frames(scene, "train", rows[0].config.reading)

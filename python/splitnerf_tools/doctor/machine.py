@@ -42,7 +42,6 @@ PACKAGES = (
     Package("pxr", "usd-core", "usd", "USDZ files, in export"),
     Package("ray", "ray", "batch", "many scenes, in batch"),
     Package("tensorboard", "tensorboard", "tensorboard", "TensorBoard's files, in train"),
-    Package("lpips", "lpips", "lpips", "LPIPS scores, in evaluate"),
 )
 
 

@@ -93,16 +93,9 @@ def relit_pictures(asset: Asset, photo: int) -> list[tuple[str, np.ndarray]]:
     side = min(RELIT_SIDE, 2 * photo)
     renderer, view, pictures = AssetRenderer(asset), turntable(asset, 1, size=(side, None))[0], []
     for name in RELIT:
-        images = renderer.render(
-            studio_light(name),
-            view.pose,
-            view.intrinsics,
-            view.width,
-            view.height,
-            spp=RELIT_SPP,
-            clamp_indirect=1.0,  # caustics of few paths are specks
-            catcher_height=lowest(asset),
-        )
+        camera = view.pose, view.intrinsics, view.width, view.height
+        options = {"spp": RELIT_SPP, "clamp_indirect": 1.0}  # caustics of few paths are specks
+        images = renderer.render(studio_light(name), *camera, **options, catcher_height=lowest(asset))
         behind = np.full((view.height, view.width, 3), RELIT_GREY, np.float32)
         pictures.append((name, linear_to_srgb(np.clip(compose(images, behind, 1.0)[..., :3], 0, 1))))
     return pictures

@@ -73,21 +73,13 @@ class Document:
         self.spend(max(0, count) * width * (OF_NOTHING if empty else 1), BYTES_OF_VALUE)
         values = np.zeros((count, width), dtype)
         if "bufferView" in accessor:
-            values = self._table(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)
+            values = self._table(accessor, dtype, width, count)
         if "sparse" in accessor:
             sparse = accessor["sparse"]
             where, what = sparse["indices"], sparse["values"]
-            rows = self._table(
-                where["bufferView"],
-                where.get("byteOffset", 0),
-                np.dtype(COMPONENTS[where["componentType"]]),
-                1,
-                sparse["count"],
-            )
+            rows = self._table(where, np.dtype(COMPONENTS[where["componentType"]]), 1, sparse["count"])
             values = values.copy()
-            values[rows[:, 0]] = self._table(
-                what["bufferView"], what.get("byteOffset", 0), dtype, width, sparse["count"]
-            )
+            values[rows[:, 0]] = self._table(what, dtype, width, sparse["count"])
         if dtype.kind == "f":
             return values.astype(np.float64)
         if accessor.get("normalized", False):
@@ -121,7 +113,8 @@ class Document:
             raise InputError(f"{self.path}: damaged GLB, it has no JSON chunk; export it again")
         return chunks[b"JSON"], chunks.get(b"BIN\0")
 
-    def _table(self, view: int, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
+    def _table(self, place: dict, dtype: np.dtype, width: int, count: int) -> np.ndarray:
+        view, offset = place["bufferView"], place.get("byteOffset", 0)
         stride = self.json["bufferViews"][view].get("byteStride", dtype.itemsize * width)
         data = self.view(view)
         if stride < dtype.itemsize * width:
