@@ -57,12 +57,12 @@ def repaired_moments(rows: Rows) -> Rows:
 
 
 def long_run(draw: Draw, n: int) -> tuple[Tensor, Rows]:
-    """Gradients of all sizes, noise and none; no step is longer than its bound (Kingma and Ba 2015, section 2.1)."""
+    """Gradients of all sizes, noise and none; no step is longer than the inequality of Cauchy and Schwarz allows for m / sqrt(v)."""
     size = draw.mixed((0.0, 1e-38, 1e-8, 1e15), draw.logarithmic(1e-10, 1e10, n)).float()
     start = draw.normal(n).float()
     param, mean, square, worst = start.clone(), *torch.zeros(3, n)
     noise = draw.normal(997, n).float()
-    longest = LR * max((1 - BETAS[0]) / (1 - BETAS[1]) ** 0.5, 1.0)
+    longest = LR * (1 - BETAS[0]) / ((1 - BETAS[1]) * (1 - BETAS[0] ** 2 / BETAS[1])) ** 0.5
     for step in range(1, LONG_RUN + 1):
         before = param.clone()
         gradient = [size * noise[step % 997]]

@@ -36,6 +36,7 @@ template <class T> struct LutSample {
   // close to 0, where those of F1 and F2 cancel
   T lost, lost_by_n_dot_v, lost_by_roughness;
   T dielectric, dielectric_by_n_dot_v, dielectric_by_roughness;  // E_d
+  T beyond_dielectric;                                           // F2 - E_d: at grazing angles both are close to 1
 };
 
 // 1 - a - b of shares, the larger one first: that difference has no rounding.
@@ -79,6 +80,8 @@ template <class T> SPLITNERF_HD LutSample<T> sample_brdf_lut(const float* lut, T
   s.rest = bilinear(rest(n00), rest(n01), rest(n10), rest(n11), fx, fy).value;
   const auto lost_at = [&](int node) { return rest_of_shares(T(lut[node]), T(lut[node + 1])); };
   const Bilinear<T> lost = bilinear(lost_at(n00), lost_at(n01), lost_at(n10), lost_at(n11), fx, fy);
+  const auto beyond = [&](int node) { return T(lut[node + 1]) - T(lut[node + 3]); };
+  s.beyond_dielectric = bilinear(beyond(n00), beyond(n01), beyond(n10), beyond(n11), fx, fy).value;
   s.lost = lost.value, s.lost_by_n_dot_v = lost.along_n_dot_v * dx, s.lost_by_roughness = lost.along_roughness * dy;
   return s;
 }
@@ -285,8 +288,13 @@ SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, 
     const SpecularAlbedo<T> metal = specular_albedo(albedo, T(1) - albedo, table, options.compensate);
     const DielectricAlbedo<T> layer = dielectric_albedo(table, options.compensate);
     const T grad_metal = grad.specular * metallic, grad_layer = grad.specular * (T(1) - metallic) - grad.kept;
+    // E_m - E_d: first of single scattering, then of what the gains add.
+    const T again = options.compensate ? table.lost / (T(1) - table.lost) : T(0);
+    const T single = albedo * (T(1) - table.lost) + (T(1) - albedo) * table.value.y;
+    const T more = table.beyond_dielectric + albedo * table.value.x +
+                   again * (albedo * single - T(kDielectricF0) * table.dielectric);
     return {grad_metal * metal.d_fr,
-            grad.specular * (metal.value - layer.value),
+            grad.specular * more,
             T(0),
             T(0),
             grad_metal * metal.d_f2,

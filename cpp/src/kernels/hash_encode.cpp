@@ -1,6 +1,5 @@
 // The hash grid over blocks of points, level by level, beside the bodies of bodies/hash_encode.h: 1.8 x forward, 2.6 x
-// with the Jacobian, 1.4 x backward (8192 points, 8 levels x 2 features of 2^15 entries; float32, one thread of an AMD
-// EPYC of family 25, AVX-512). The gradient to the positions gained 1.2 x and has no kernel.
+// with the Jacobian, 1.4 x backward (8192 points, 8 levels x 2 features of 2^15 entries; float32, one thread, AVX-512).
 #include <cstring>
 
 #include "kernel_set.h"

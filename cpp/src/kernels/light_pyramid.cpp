@@ -1,6 +1,5 @@
 // The light's pyramid, its harmonics for as many points as a vector has lanes, beside LightLookupBody and
-// read_light_backward: 5 x forward, 6 x backward (8192 points, half of them on the harmonics; float32, one thread of an
-// AMD EPYC of family 25, AVX-512).
+// read_light_backward: 5 x forward, 6 x backward (8192 points, half of them on the harmonics; float32, one thread, AVX-512).
 #include "kernel_set.h"
 
 namespace splitnerf::SPLITNERF_ISA {
