@@ -74,7 +74,7 @@ SKIPS = {  # what a step leaves out, with the settings that have it done
 ALONE = "--set", "refinement.enabled=false"  # training, without what comes after it
 PARTS = {  # our part in the place of one of the paper's
     "normals by derivatives": ("surface.normals=analytic",),
-    "smoothness of normals": ("losses.smoothness_weight=0.03",),
+    "smoothness of normals": ("losses.smoothness_weight=0.01",),
     "eikonal weight": ("losses.eikonal_weight=0.3",),
     "masks": ("losses.mask_weight=1",),
     "shape at the start": ("surface.start=stereo",),
@@ -144,7 +144,7 @@ class Page:
     pictures: bool = False
     steps: int = 0
     table: tuple[str, tuple[str, ...], tuple[str, ...]] | None = (
-        None  # what has lines, and columns, and what these hold; None: rows
+        None  # by lines and columns, and what it holds; None: all rows
     )
 
 

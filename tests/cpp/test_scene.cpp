@@ -42,24 +42,6 @@ TEST(Scene, CubeHitsStandAtTheirClosedFormDistance) {
   EXPECT_LT(scene.trace_closest({3, 0, 0}, {1, 0, 0}, kInfinity).t, 0);
 }
 
-TEST(Scene, SphereOccludesItsCone) {
-  // From distance r a unit sphere blocks directions within asin(1/r) of its centre.
-  const Scene scene = make_scene(sphere_mesh(200, 400));
-  const Vec o{0, 0, 2};
-  std::vector<Vec> origins, directions;
-  std::vector<uint8_t> expected;
-  const double edge = std::cos(std::asin(0.5));
-  for (uint32_t i = 0; i < 20000; ++i) {
-    const Vec d = fibonacci_sphere<float>(i, 20000);
-    const double cosine = -d.z;
-    if (std::abs(cosine - edge) < 2e-4) continue;  // the tessellation's error
-    origins.push_back(o);
-    directions.push_back(d);
-    expected.push_back(cosine > edge ? 0 : 1);
-  }
-  EXPECT_EQ(visibility(scene, origins, directions), expected);
-}
-
 TEST(Scene, EveryCountIsHandled) {
   const Scene scene = make_scene(cube_mesh());
   for (int n : {0, 1, 15, 16, 17, 4095, 4097}) {

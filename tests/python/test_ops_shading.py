@@ -36,19 +36,29 @@ def test_an_option_that_is_not_known_is_named():
     check_error(ask, "light_queries", "query", "mean", "median")
 
 
+SMOOTH = (
+    [0.887, -0.036, -0.460],
+    [-0.849, 0.157, 0.504],
+    [0.8, 0.5, 0.2],
+    [0.0],
+    [0.95],
+    [0.5, 0.4, 0.45],
+    [1.0, 1.0, 0.5],
+)
+GRAZED = [0.0, 0.0, 1.0], [1.0, 0.0, 6.27e-4], [0.009, 0.0, 0.002], [0.0], [0.0], [0.7, 0.4, 0.05], [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize("compensate", [False, True])
-def test_smooth_surfaces_keep_the_digits_of_their_gradient(compensate):
-    """F1 + F2 is 1 but for a millionth there, and the gradient to roughness is the change of that millionth."""
-    normals, view_dirs = (unit(torch.tensor([x])) for x in ([0.887, -0.036, -0.460], [-0.849, 0.157, 0.504]))
-    rest = [
-        torch.tensor([x]) for x in ([0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1.0, 1.0, 0.5], [1.0], [0.8])
-    ]
-    found = []
+@pytest.mark.parametrize(("values", "of"), [(SMOOTH, 3), (GRAZED, 4)])
+def test_gradients_keep_their_digits_where_shares_of_light_nearly_cancel(compensate, values, of):
+    """To roughness: F1 + F2 of smooth surfaces is 1 but for a millionth, and it is the change of that millionth. To metallic: dark
+    metal at a grazing angle reflects 0.97 of the light, a thousandth more than the dielectric does."""
+    inputs, found = [torch.tensor([x]) for x in (*values, [1.0], [0.8])], []
+    inputs[:2] = map(unit, inputs[:2])
     for dtype in (torch.float32, torch.float64):
-        inputs = [x.to(dtype) for x in (normals, view_dirs, *rest)]
-        roughness = inputs[3].requires_grad_()
-        out = lib.split_sum_shade(*inputs, brdf_lut(), 0, compensate, None, None)
-        found.append([torch.autograd.grad(x, roughness, retain_graph=True)[0].item() for x in out[0]])
+        leaves = [x.to(dtype).requires_grad_() for x in inputs]
+        out = lib.split_sum_shade(*leaves, brdf_lut(), 0, compensate, None, None)
+        found.append([torch.autograd.grad(x, leaves[of], retain_graph=True)[0].item() for x in out[0]])
     assert found[0] == pytest.approx(found[1], rel=1e-5)
 
 

@@ -303,6 +303,12 @@ def test_a_held_run_resumes_with_the_same_bits(data, tmp_path, monkeypatch):
         assert torch.equal(ours, theirs)
 
 
+def test_in_half_a_minute_no_photos_are_compared(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(loop, "start_shape", lambda *_: pytest.fail("photos are compared"))
+    config = tiny(**{"surface.start": "stereo", "run.max_minutes": 0.5})
+    assert begun(load_dataset(data), config, tmp_path, torch.device("cpu")).step == 0
+
+
 @pytest.mark.parametrize(("radius", "of_sphere"), [(0.7, 1.3), (1.3, 0.7)])
 def test_photos_choose_between_an_unsure_shape_and_a_sphere(data, tmp_path, monkeypatch, radius, of_sphere):
     """What they show is about a ball of radius 0.7."""

@@ -176,12 +176,11 @@ class Stages:
         elif event.kind in self._names:
             now = time.monotonic()
             spent, left = round(now - self._started), max(0, round(self._end - now))
-            minutes = ["{}:{:02d}".format(*divmod(seconds, 60)) for seconds in (spent, left, spent + left)]
-            done, of_all = event.kind == "evaluation", left > 0
-            more = (
-                f" of {minutes[2]} minutes" if done and of_all else " minutes" + f" and {minutes[1]} to come" * of_all
-            )
-            self._say(event.kind, f", after {minutes[0]}{more}")
+            words, clock = "{} minutes", "{}:{:02d}".format
+            if left:
+                words = "{} of {} minutes" if event.kind == "evaluation" else "{} minutes and {} to come"
+            rest = spent + left if event.kind == "evaluation" else left
+            self._say(event.kind, ", after " + words.format(*(clock(*divmod(x, 60)) for x in (spent, rest))))
 
     def _say(self, name: str, more: str) -> None:
         print(f"stage {self._names.index(name) + 1} of {len(self._names)}: {name}{more}", file=sys.stderr, flush=True)

@@ -36,7 +36,7 @@ from splitnerf.training.schedule import (
     progress_by,
     set_learning_rate,
 )
-from splitnerf.training.start import StartShape, fit_to, start_shape
+from splitnerf.training.start import COMPARED_FROM, StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
 # Steps of a first shape that is not sure, and of a sphere beside it: the fewest that tell, and the most; wrong shapes lead at first.
@@ -260,7 +260,7 @@ def begun(
     training, c = Training(dataset, config, run, device, observer), config
     if resume:
         training.restore()
-    elif c.surface.start == "stereo":
+    elif c.surface.start == "stereo" and not 0 < c.training_minutes < COMPARED_FROM:
         note_once("the photos are compared to find a first shape")
         with same_bits(c.run.deterministic):
             shape = start_shape(training.photos, training.grid.hull, c)
