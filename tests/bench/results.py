@@ -64,8 +64,8 @@ SCORES = {  # column: the evaluation's keys, digits
     "steps": (("training", "step"), 0),
     "ms a step": (("training", "ms"), 1),
 }
-SKIPS = {  # what a step leaves out, with the settings that have it done
-    "space outside the hull": ("hull_until=0",),
+SKIPS = {  # what a step leaves out, with the settings that have it done; and the hull's cells, which it samples in any case at first
+    "all cells of the hull at first": ("hull_until=0",),
     "faint samples": ("sampling.min_weight=0",),
     "every other sample": ("step_scale=1", "min_step=0.005"),
     "shading of most samples": ("shades_per_ray=0",),
@@ -342,8 +342,7 @@ def write_page(out: Path, name: str, rows: list[Row], work: Path) -> None:
         Image.fromarray(np.concatenate(pictures, axis=1)).reduce(2).save(out / f"{name}.jpg", quality=80)
         lines += [f"![A view of each: truth, prediction, four times the error]({name}.jpg)", ""]
     lines += [
-        "*trained* is what training alone exports, *refined* what a run delivers; the minutes are those of both. Scores are defined in",
-        "[results](../results.md#how-scores-are-defined); relit views are path traced by the program.",
+        "*trained* is what training alone exports, *refined* what a run of these minutes delivers. [How scores are defined](../results.md#how-scores-are-defined)",
         "",
         *(table_of(rows, page) if page.table is None else table_of_means(rows, page)),
         "",

@@ -24,6 +24,8 @@ OTHERS = {  # what keeps torch to an instruction set, too
 }
 LATE = 0.9  # the progress of the timed steps
 LEAST = 0.3  # ms, below which an operator is counted with the others
+# Arguments of which operators read what they need at random; the others are read once, from end to end.
+GATHERED = {"table", "stored", "vertices", "vertex_normals", "starts", "order", "bits", "hits", "levels", "cells"}
 GROUPS = {
     "splitnerf::": "other operators of splitnerf",
     "aten::": "other operators of torch",
@@ -56,12 +58,13 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
 
         def __torch_dispatch__(self, func, types, args=(), kwargs=None):
             result, name = func(*args, **(kwargs or {})), func.name().split(".")[0]
-            tensors = {id(x): x for x in tree_leaves((args, kwargs, result)) if isinstance(x, torch.Tensor)}
-            self.moved[name] += sum(x.numel() * x.element_size() for x in tensors.values())
             of = dict(zip((argument.name for argument in func._schema.arguments), args))
-            if "n_active" in of:
-                gathers, flops = field_work(name.removeprefix("splitnerf::"), of)
-                points = int(result[4].sum()) if name.endswith("sample_rays") else len(of["positions"])
+            whole = ([x for key, x in of.items() if key not in GATHERED], kwargs, result)
+            tensors = {id(x): x for x in tree_leaves(whole) if isinstance(x, torch.Tensor)}
+            self.moved[name] += sum(x.numel() * x.element_size() for x in tensors.values())
+            if name.startswith("splitnerf::"):
+                gathers, flops = work_at_a_point(name.removeprefix("splitnerf::"), of)
+                points = int(result[4].sum()) if name.endswith("sample_rays") else len(args[0])
                 self.gathers[name] += points * gathers
                 self.flops[name] += points * flops
             return result
@@ -102,20 +105,26 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
         }
         level, at = torch.rand(1 << 17, dtype=torch.float64), torch.randint(1 << 17, (1 << 21,))  # entries of 8 bytes
         gather = min(_timed(lambda: level.index_select(0, at)) for _ in range(5))
-        big = torch.rand(1 << 24)
-        copy = min(_timed(lambda: big.clone()) for _ in range(5))
+        big = torch.rand(2, 1 << 21)  # as large as the hash grid
+        copy = min(_timed(lambda: big[0].copy_(big[1])) for _ in range(20))
         square = torch.rand(1024, 1024)
         product = min(_timed(lambda: square @ square) for _ in range(5))
         rates = {
-            "copy": 8 * len(big) / copy / 1e9,
+            "copy": 4 * big.numel() / copy / 1e9,
             "gathers": len(at) / gather / 1e9,
             "flops": 2 * 1024**3 / product / 1e9,
         }
         return {"wall": wall, "rays": training.n_rays, "rows": rows, **rates}
 
 
-def field_work(operator: str, of: dict) -> tuple[int, int]:
-    """The random reads (and additions) and the flops of an operator of the distance field at a point, from its arguments."""
+def work_at_a_point(operator: str, of: dict) -> tuple[int, int]:
+    """The random reads and additions, and the flops, of an operator at a point, from its arguments; 0 of others than these."""
+    if operator == "cached_occlusion":
+        return 0, 60 * len(of["directions"])  # cosine, share and lobe of a direction, and fourteen sums
+    if operator.startswith("light_lookup"):
+        return 8, 0  # four texels of two maps
+    if "n_active" not in of:
+        return 0, 0
     corners, n_features = 8 * of["n_active"], of["table"].shape[1]
     (width, n_inputs), n_outputs = of["hidden"].shape, of["out"].shape[0]
     layer, last, encoding = 2 * width * n_inputs, 2 * width * n_outputs, 2 * corners * n_features
@@ -150,7 +159,7 @@ def page(cases: dict[tuple[str, int], dict], head: str) -> str:
     lines += ["|---|" + "---|" * len(cases)]
     rows = {
         "wall": "a step, ms",
-        "copy": "copying memory, GB/s",
+        "copy": "copying 8 MB, GB/s",
         "gathers": "random reads of 8 bytes from 1 MB, 10^9 a second",
         "flops": "a matrix product, GFLOP/s",
     }
@@ -187,9 +196,9 @@ def page(cases: dict[tuple[str, int], dict], head: str) -> str:
         lines.append(f"| sum | {total:.2f} | | {on_two:.2f} | | {eight:.2f} | | |")
     lines += [
         "",
-        "Times are those of torch's profiler, about a microsecond too long for each call. MB: the tensors that an operator reads and writes. *Divided*:",
+        "Times are those of torch's profiler, about a microsecond too long for each call. MB: what an operator reads and writes as a whole. *Divided*:",
         "the share of the time that two threads halve; *8 cores* follows from it by Amdahl's law and was not measured. *Share of its limit*: the time that",
-        "the bytes, the random reads of the hash grid or the flops of the networks alone would take at the rates above, whichever is longest.",
+        "these bytes, the random reads or the flops alone would take at the rates above, whichever is longest.",
         "",
     ]
     return "\n".join(lines)

@@ -8,8 +8,7 @@ import pytest
 import torch
 import trimesh
 from mesh_shapes import OFFSET, between, bits_of, bowl, cache_of, corners, grid_mesh, lattice, refresh, scene_of
-from op_cases import cached_occlusion_inputs
-from op_checks import generator, lib, unit
+from op_checks import generator, unit
 from splitnerf import _core
 from splitnerf.fields import Light, SkyCells, VisibilityBits
 from splitnerf.fields.light import lobe_roughness, panorama_directions
@@ -84,11 +83,6 @@ def test_the_furnace_of_a_bowl(albedo):
     torch.testing.assert_close(i_s, i_d, rtol=1e-4, atol=1e-5)  # roughness 1 about the normal
     if albedo == 1.0:  # all that arrives, from sky or bowl, is 1
         torch.testing.assert_close((o_d + i_d)[inner], torch.ones(int(inner.sum()), 3), rtol=0, atol=0.04)
-
-
-def test_a_point_that_is_none_has_no_factors():
-    inputs = cached_occlusion_inputs(torch.float32)
-    assert all(part.isnan().all() for part in lib.cached_occlusion(inputs[0] * math.nan, *inputs[1:]))
 
 
 # ---- what a model keeps of a mesh and of the light ----
