@@ -24,7 +24,7 @@ TESTS = {
     "data/gltf/": "test_gltf.py",
     "devices.py": "test_device.py test_doctor.py test_refreshes.py test_train.py",
     "errors.py": "test_refusals.py test_bad_files.py",
-    "evaluate/": "test_evaluate.py test_metrics.py",
+    "evaluate/": "test_evaluate.py test_metrics.py test_lpips.py",
     "export/": "test_export.py test_bake.py test_meshing.py",
     "files.py": "test_files.py test_own_files.py",
     "fields/": "test_shading_model.py test_views.py",

@@ -8,7 +8,6 @@
     time      error against time: half a minute to 30 minutes, two objects, two seeds
     skips     training with and without what a step leaves out, by equal time and by equal steps
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
-    parts     the published method in small (2000 steps), and with our part in the place of one of its own
     ablation  what each part of the method is worth behind the refinement, by equal steps (splitnerf ablate); hours
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
@@ -72,18 +71,6 @@ SKIPS = {  # what a step leaves out, with the settings that have it done; and th
     "most steps of the light": ("light_step_every=1",),
 }
 ALONE = "--set", "refinement.enabled=false"  # training, without what comes after it
-PARTS = {  # our part in the place of one of the paper's
-    "normals by derivatives": ("surface.normals=analytic",),
-    "smoothness of normals": ("losses.smoothness_weight=0.01",),
-    "eikonal weight": ("losses.eikonal_weight=0.3",),
-    "masks": ("losses.mask_weight=1",),
-    "shape at the start": ("surface.start=stereo",),
-    "hash grid": ("surface.n_levels=9", "surface.growth=1.4697", "surface.log2_table_size=17", "base_resolution=16"),
-    "linear colours": ("shading.compositing=linear",),
-    "materials": ("materials.inputs=grid",),
-    "light": ("light.kind=pyramid",),
-    "occlusion": ("occlusion.kind=bits",),
-}
 
 
 def with_settings(words: tuple, settings: tuple[str, ...]) -> tuple:
@@ -93,15 +80,9 @@ def with_settings(words: tuple, settings: tuple[str, ...]) -> tuple:
 
 PAPER = with_settings(("--preset", "paper"), ("target_samples=4096", "mesh.resolution=192", "run.preview_every=1"))
 PAPER = with_settings(PAPER, ("light_samples=2048", "light_queries=2048"))
-SMALL = with_settings(
-    (*PAPER, "--downscale", 2), ("target_samples=1024", "mesh.resolution=96", "export.resolution=192")
-)
-SMALL = with_settings(SMALL, tuple(f"{of}_width=64" for of in ("materials", "light", "occlusion")))
 SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     "cpu": (),
     "paper": PAPER,
-    "small paper": SMALL,
-    **{f"small paper, our {name}": with_settings(SMALL, settings) for name, settings in PARTS.items()},
     "all skips": ALONE,
     **{f"without: {name}": with_settings(ALONE, offs) for name, offs in SKIPS.items()},
     "no skips": with_settings(ALONE, tuple(off for offs in SKIPS.values() for off in offs)),
@@ -185,13 +166,6 @@ PAGES = {
         (("cpu", 30), ("paper", 0)),
         200,
         steps=20000,
-    ),
-    "parts": Page(
-        "The published method with one of our parts, in small",
-        ("boombox",),
-        tuple((name, 0) for name in SETTINGS if name.startswith("small paper")),
-        200,
-        steps=2000,
     ),
 }
 NAMES = *PAGES, "ablation"
