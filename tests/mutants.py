@@ -1,15 +1,21 @@
 """Mutation testing: changes a source file in one place after the other and runs the fast tests that concern it each time.
 
-    python tests/mutants.py python/splitnerf/training/schedule.py ...
+    python tests/mutants.py [--some N] python/splitnerf/training/schedule.py python/splitnerf/refinement ...
 
-A change that no test sees is printed as a diff.
+A folder is all of its files; --some takes N changes of each argument, chosen at random with seed 0. A change that no test sees is printed as
+a diff, and in the end there is a line for each argument.
 cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
 """
 
+import argparse
+import contextlib
+import functools
 import json
 import os
+import random
 import re
 import shutil
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -113,35 +119,49 @@ def cosmic_ray(*arguments: object) -> str:
     return done.stdout
 
 
-def mutate(path: Path) -> tuple[int, int, list[str]]:
-    """How many mutants there are, how many were killed, and the others as diffs."""
+def mutants_of(path: Path) -> tuple[Path, Path, list[str]]:
+    """The session of a file, its settings, and the names of all its mutants."""
     if subprocess.run(["git", "diff", "--quiet", "HEAD", "--", str(path)], cwd=ROOT).returncode:
         sys.exit(f"{path}: has changes that are not committed; commit them first")
-    folder = ROOT / "build" / "mutants" / path.stem
+    folder = ROOT / "build" / "mutants" / path.with_suffix("")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command = " ".join([sys.executable, "-m pytest -q -x -p no:cacheprovider", *tests_of(path)])
+    check(command)
     settings, session = folder / "settings.toml", folder / "session.sqlite"
     settings.write_text(SETTINGS.format(path=path.as_posix(), command=command, left_out=json.dumps(LEFT_OUT)))
+    cosmic_ray("init", settings, session)
+    filters = shutil.which("cr-filter-operators") or Path(sys.executable).with_name("cr-filter-operators")
+    subprocess.run([filters, str(session), str(settings)], cwd=ROOT, check=True)
+    return session, settings, [job for job, result in outcomes(session).items() if result is None]
+
+
+@functools.cache
+def check(command: str) -> None:
+    """Ends the program where tests fail without a mutant."""
+    done = subprocess.run(command.split(), cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{command}\n{done.stdout[-2000:]}")
+
+
+def outcomes(session: Path) -> dict[str, dict | None]:
+    """The result of each mutant by its name; None: it has not run."""
+    lines = map(json.loads, cosmic_ray("dump", session).splitlines())
+    return {item["job_id"]: result for item, result in lines}
+
+
+def mutate(path: Path, session: Path, settings: Path, chosen: list[str]) -> tuple[int, list[str]]:
+    """Runs the tests with the chosen mutants: how many ran, and as diffs those that no test saw."""
+    names = ",".join("?" * len(chosen))
+    with contextlib.closing(sqlite3.connect(session)) as database, database:
+        for table in ("mutation_specs", "work_items"):
+            database.execute(f"DELETE FROM {table} WHERE job_id NOT IN ({names})", chosen)
     try:
-        cosmic_ray("baseline", settings)
-        cosmic_ray("init", settings, session)
-        subprocess.run(
-            [
-                Path(shutil.which("cr-filter-operators") or Path(sys.executable).with_name("cr-filter-operators")),
-                str(session),
-                str(settings),
-            ],
-            cwd=ROOT,
-            check=True,
-        )
         cosmic_ray("exec", settings, session)
     finally:
         subprocess.run(["git", "checkout", "--quiet", "--", str(path)], cwd=ROOT, check=True)
-    results = [json.loads(line)[1] for line in cosmic_ray("dump", session).splitlines()]
-    run = [result for result in results if result and result["worker_outcome"] == "normal"]
-    left = [changed_lines(result["diff"]) for result in run if result["test_outcome"] == "survived"]
-    return len(run), len(run) - len(left), left
+    run = [r for r in outcomes(session).values() if r and r["worker_outcome"] == "normal"]
+    return len(run), [changed_lines(r["diff"]) for r in run if r["test_outcome"] == "survived"]
 
 
 def changed_lines(diff: str) -> str:
@@ -151,13 +171,25 @@ def changed_lines(diff: str) -> str:
     return "\n".join([f"  near line {at[1] if at else '?'}", *(f"  {line}" for line in lines)])
 
 
-def main(files: list[str]) -> None:
-    if not files:
-        sys.exit("which files? for example: make mutants MUTANTS=python/splitnerf/training/schedule.py")
-    for file in files:
-        n, killed, left = mutate(Path(file))
-        print("\n".join([f"{file}: {n} mutants, {killed} killed, {n - killed} survived", *left]), flush=True)
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
+    parser.add_argument("--some", type=int, metavar="N", help="mutants of each argument (default: all)")
+    options, table = parser.parse_args(), []
+    for path in options.paths:
+        made = {file: mutants_of(file) for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])}
+        every = [(file, name) for file, (_, _, names) in made.items() for name in names]
+        chosen = random.Random(0).sample(every, min(options.some or len(every), len(every)))
+        n, n_left = 0, 0
+        for file, (session, settings, _) in made.items():
+            names = [name for of, name in chosen if of == file]
+            if names:
+                run, left = mutate(file, session, settings, names)
+                print("\n".join([f"{file}: {run} mutants, {run - len(left)} killed", *left]), flush=True)
+                n, n_left = n + run, n_left + len(left)
+        table.append(f"{path}: {len(every)} mutants, {n} tried, {n - n_left} killed")
+    print("\n".join(table))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

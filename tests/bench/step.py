@@ -3,7 +3,8 @@
     python tests/bench/step.py RUN DATA [--steps 200] [--out docs/benchmarks/step.md]
 
 RUN is a finished training of DATA. The steps are those near its end. The operators must pass `splitnerf doctor`'s test with each
-instruction set before anything is timed.
+instruction set before anything is timed. Beside them stands the same step in plain torch: the same samples, and every operator that
+tests/reference.py has in that form.
 """
 
 import argparse
@@ -35,8 +36,31 @@ SOURCES = tuple(f"cpp/{name}" for name in ("src", "include", "torch"))
 SOURCES += tuple(f"python/splitnerf/{name}" for name in ("training", "render", "fields"))
 
 
-def measured(run: Path, data: Path, n_steps: int) -> dict:
-    """Times and counts of this process's steps: ms a step, then for each operator ms, calls and bytes a step."""
+def use_plain_torch() -> None:
+    """From here on the operators that tests/reference.py has are its functions."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    import reference
+    import torch
+    from splitnerf.ops import light, rays, sdf, shading, training, visibility
+
+    in_form = {  # where an operator returns its terms in one tensor, or what its backward pass reads as well
+        "sdf_field": lambda *inputs: reference.sdf_field(*inputs[:-1]),
+        "pixel_losses": lambda *inputs: torch.stack(reference.pixel_losses(*inputs)),
+        "gradient_losses": lambda *inputs: (torch.stack(reference.gradient_losses(*inputs)),),
+        "quadratic_entropy": lambda x: (reference.quadratic_entropy(x),),
+    }
+
+    class Plain:
+        def __getattr__(self, name: str):
+            return in_form.get(name) or getattr(reference, name, None) or getattr(torch.ops.splitnerf, name)
+
+    for module in (light, rays, sdf, shading, training, visibility):
+        module.lib = Plain()
+
+
+def measured(run: Path, data: Path, n_steps: int, plain: bool) -> dict:
+    """Times and counts of this process's steps: ms a step, then for each operator ms, calls and bytes a step; of a step in plain torch the
+    time alone."""
     import torch
     from splitnerf.pipeline import load_splits
     from splitnerf.training.checkpoint import config_of, load_checkpoint
@@ -89,6 +113,10 @@ def measured(run: Path, data: Path, n_steps: int) -> dict:
                 training.advance(Silent())
             return 1e3 * (time.perf_counter() - began) / n
 
+        if plain:
+            use_plain_torch()
+            steps(4)
+            return {"wall": sorted(steps(4) for _ in range(5))[2]}
         steps(20)
         wall = sorted(steps(n_steps // 5) for _ in range(5))[2]
         with profile(activities=[ProfilerActivity.CPU]) as profiled:
@@ -140,10 +168,10 @@ def _timed(body) -> float:
     return time.perf_counter() - began
 
 
-def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int) -> dict | None:
+def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int, plain: bool = False) -> dict | None:
     """What a process of its own measures; None where the processor has no such instruction set."""
     environment = os.environ | OTHERS[isa] | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
-    words = [sys.executable, __file__, run, data, "--steps", str(n_steps), "--measure"]
+    words = [sys.executable, __file__, run, data, "--steps", str(n_steps), "--measure", *["--plain"] * plain]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"{isa}, {threads} threads: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
@@ -159,6 +187,7 @@ def page(cases: dict[tuple[str, int], dict], head: str) -> str:
     lines += ["|---|" + "---|" * len(cases)]
     rows = {
         "wall": "a step, ms",
+        "plain": "the same step in plain torch, ms",
         "copy": "copying 8 MB, GB/s",
         "gathers": "random reads of 8 bytes from 1 MB, 10^9 a second",
         "flops": "a matrix product, GFLOP/s",
@@ -211,14 +240,17 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/step.md"))
     parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--plain", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.measure:
-        print(json.dumps(measured(args.run, args.data, args.steps)))
+        print(json.dumps(measured(args.run, args.data, args.steps, args.plain)))
         return
     from splitnerf_tools.bench.provenance import header, provenance
 
-    cases = {case: asked(args.run, args.data, args.steps, *case) for case in CASES}
-    cases = {case: found for case, found in cases.items() if found is not None}
+    inputs = args.run, args.data, args.steps
+    cases = {case: found for case in CASES if (found := asked(*inputs, *case)) is not None}
+    for case, found in cases.items():
+        found["plain"] = asked(*inputs, *case, plain=True)["wall"]
     facts = provenance(SOURCES, f"python tests/bench/step.py {args.run.name} {args.data.name}")
     del facts["threads"], facts["kernels"]
     args.out.write_text(page(cases, header(facts)))

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -238,3 +239,16 @@ def test_a_page_says_its_rows_and_the_commit_of_the_oldest(monkeypatch, tmp_path
     assert "commit abc" in head and "date 2026-01-02" in head and "avx" not in head  # each row names its kernels
     assert "| knot | 30 |" in lines[2] and " 32.5 " in lines[2] and "avx2" in lines[2] and "avx512" in lines[3]
     assert "Mean of 2 runs of 30 minutes: relit 31.0 dB" in text
+
+
+def test_the_readme_shows_scores_of_the_page():
+    rows = results.read_rows(results.ROOT / "docs/benchmarks/scenes.csv")
+    measured = {
+        (row["scene"], row["relit, dB"], row["albedo, dB"])
+        for row in rows
+        if (row["minutes"], row["asset"]) == ("8", "refined")
+    }
+    shown = re.findall(
+        r"^\| (\w+)[^|]* \| ([\d.]+) dB \| ([\d.]+) dB \|$", (results.ROOT / "README.md").read_text(), re.M
+    )
+    assert shown and measured.issuperset(shown)

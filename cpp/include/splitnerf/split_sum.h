@@ -213,16 +213,17 @@ template <class T> SPLITNERF_HD ScatteringGain<T> scattering_gain(T fr, T lost, 
 // lost cancels another: on smooth surfaces those by F1 and F2 would.
 template <class T> struct SpecularAlbedo {
   T value, d_fr, d_f2, d_lost;
-  T rest;  // 1 - E
+  T rest;    // 1 - E
+  T single;  // E without the gain
 };
 template <class T>
 SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T rest_of_fr, const LutSample<T>& table, bool compensate) {
   const T f1 = table.value.x, f2 = table.value.y, single = fr * (T(1) - table.lost) + rest_of_fr * f2;
-  if (!compensate) return {single, f1, rest_of_fr, -fr, table.lost + rest_of_fr * f1};
+  if (!compensate) return {single, f1, rest_of_fr, -fr, table.lost + rest_of_fr * f1, single};
   const ScatteringGain<T> gain = scattering_gain(fr, table.lost, compensate);
   const T inv_s = T(1) / (T(1) - table.lost);
   return {single * gain.value, f1 * gain.value + single * gain.d_fr, rest_of_fr * gain.value,
-          rest_of_fr * fr * (f2 * inv_s * inv_s - T(1)), rest_of_fr * (table.lost + f1 * gain.value)};
+          rest_of_fr * fr * (f2 * inv_s * inv_s - T(1)), rest_of_fr * (table.lost + f1 * gain.value), single};
 }
 
 // Directional albedo E = gain E_d of a dielectric layer; its partial derivatives are gain by E_d, and d_lost.
@@ -289,10 +290,8 @@ SPLITNERF_HD ChannelAlbedoGrad<T> channel_albedo_backward(ShadeOptions options, 
     const DielectricAlbedo<T> layer = dielectric_albedo(table, options.compensate);
     const T grad_metal = grad.specular * metallic, grad_layer = grad.specular * (T(1) - metallic) - grad.kept;
     // E_m - E_d: first of single scattering, then of what the gains add.
-    const T again = options.compensate ? table.lost / (T(1) - table.lost) : T(0);
-    const T single = albedo * (T(1) - table.lost) + (T(1) - albedo) * table.value.y;
     const T more = table.beyond_dielectric + albedo * table.value.x +
-                   again * (albedo * single - T(kDielectricF0) * table.dielectric);
+                   layer.gain.d_fr * (albedo * metal.single - T(kDielectricF0) * table.dielectric);
     return {grad_metal * metal.d_fr,
             grad.specular * more,
             T(0),

@@ -118,10 +118,11 @@ def loss_terms(
             linear=ray.linear,
         ),
     )
-    terms.add(
-        {"eikonal": kept * w.eikonal_weight, "smoothness": (shapes and w.smoothness_weight) or None},
-        gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside) * prior_factors(terms["colour"].value),
-    )
+    smoothness = (shapes and w.smoothness_weight) or None
+    of_normals = gradient_losses(ray.gradients, ray.weights.detach(), ray.found.beside)
+    if smoothness:
+        of_normals = of_normals * prior_factors(terms["colour"].value)
+    terms.add({"eikonal": kept * w.eikonal_weight, "smoothness": smoothness}, of_normals)
     terms.add(
         {"metal": w.metal_weight or None, "dark_metal": w.dark_metal_weight or None},
         material_losses(ray.points.albedo.detach(), ray.points.metallic, ray.shares),
