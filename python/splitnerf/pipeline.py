@@ -350,16 +350,10 @@ def export_run(
             asset.name = asset_name(run)
             exported = write_delivered(run, out, formats, asset, occlusion_texture(asset), placing)
         else:
-            exported = write_assets(
-                out,
-                model,
-                content["box_from_world"].numpy(),
-                Cameras(**content["cameras"]),
-                formats=formats,
-                name=asset_name(run),
-                placing=placing,
-                ground=None if content.get("ground") is None else content["ground"].numpy(),
-            )
+            where = content["box_from_world"].numpy(), Cameras(**content["cameras"])
+            options = {"formats": formats, "name": asset_name(run), "placing": placing}
+            ground = None if content.get("ground") is None else content["ground"].numpy()
+            exported = write_assets(out, model, *where, **options, ground=ground)
         if out.resolve() != run.resolve():
             known, _ = read_place(run) or (np.zeros(3), 1.0)
             write_place(out, known + exported.origin, exported.scale)

@@ -27,9 +27,7 @@ needs_chromium = pytest.mark.skipif(
 def look_at(url: str, steps: Iterable[dict | Callable[[], object]]) -> dict:
     """What a page says while it does the steps, see tests/viewer/look.mjs; a step that is a function is called here."""
     words = ["node", str(LOOK), str(SOURCES), CHROMIUM, url]
-    with subprocess.Popen(
-        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as browser:
+    with subprocess.Popen(words, text=True, **dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)) as browser:
         watch = threading.Timer(400, browser.kill)
         watch.start()
         try:

@@ -56,10 +56,8 @@ def traced(model: SceneModel, mesh: trimesh.Trimesh) -> VisibilityBits:
     return model.trace(scene_of(mesh), vertices, faces, model.cells.centres)
 
 
-def cache_of(mesh: trimesh.Trimesh, n: int = 256, offset: float = OFFSET, with_hits: bool = False) -> VisibilityCache:
-    return VisibilityCache.trace(
-        scene_of(mesh), *corners(mesh), mesh.area, lattice(n), offset=offset, with_hits=with_hits
-    )
+def cache_of(mesh: trimesh.Trimesh, n: int = 256, **options: object) -> VisibilityCache:
+    return VisibilityCache.trace(scene_of(mesh), *corners(mesh), mesh.area, lattice(n), **{"offset": OFFSET} | options)
 
 
 def grid_mesh(size: float, cells: int, z: float = 0.0) -> trimesh.Trimesh:

@@ -304,9 +304,7 @@ def sdf_field_inputs(n: int = 7, dtype=torch.float64) -> tuple:
 
 
 def cached_occlusion_inputs(dtype, n: int = 9, with_hits: bool = True) -> tuple:
-    mesh = trimesh.util.concatenate(
-        [grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))]
-    )
+    mesh = grid_mesh(2.0, 5) + trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))
     cache = cache_of(mesh, 64, with_hits=with_hits)
     x, normals = (t[:n].to(dtype) for t in between(mesh, 9))
     lobes = unit(normals + 0.3 * unit(torch.randn(9, 3, generator=generator(1)))[:n].to(dtype))
@@ -327,9 +325,7 @@ def cached_visibility_inputs(dtype, with_hits: bool = True) -> tuple:
 
 @functools.cache
 def floor_under_a_ball() -> MeshScene:
-    return scene_of(
-        trimesh.util.concatenate([grid_mesh(2.0, 5), trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6))])
-    )
+    return scene_of(grid_mesh(2.0, 5) + trimesh.creation.icosphere(1, 0.5).apply_translation((0, 0, 0.6)))
 
 
 def traced_points(n: int = 9) -> tuple:

@@ -44,12 +44,8 @@ def with_textures(asset: Asset, **textures: np.ndarray) -> Asset:
 def orange(asset: Asset) -> Asset:
     """Another asset with saturated colours, and normals whose green channel shows when it is flipped."""
     size = asset.materials[0].normal_texture.shape[:2]
-    values = {
-        "albedo_texture": (0.8, 0.4, 0.1),
-        "roughness_metallic_texture": (0.4, 0.0),
-        "normal_texture": (0.0, 0.4, 0.84**0.5),
-    }
-    return with_textures(asset, **{name: np.full((*size, len(x)), x, np.float32) for name, x in values.items()})
+    values = {"albedo": (0.8, 0.4, 0.1), "roughness_metallic": (0.4, 0.0), "normal": (0.0, 0.4, 0.84**0.5)}
+    return with_textures(asset, **{f"{k}_texture": np.full((*size, len(x)), x, np.float32) for k, x in values.items()})
 
 
 def lamps() -> np.ndarray:

@@ -291,8 +291,8 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
 def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
     material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
     asset = dataclasses.replace(square(), materials=[material])
-    assert (encode_maps("a", asset, None).orm[..., 0] == 255).all()
-    assert (encode_maps("a", asset, np.zeros((4, 4))).orm[..., 0] == 0).all()
+    assert (encode_maps("a", asset, None)[1][..., 0] == 255).all()
+    assert (encode_maps("a", asset, np.zeros((4, 4)))[1][..., 0] == 0).all()
     asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
     with pytest.raises(RuntimeError, match="finite"):
         encode_maps("a", asset, None)

@@ -146,35 +146,24 @@ def test_a_released_scene_raises(name):
 
 X, ONE = torch.tensor([[0.0, 0.0, 1.0]]), torch.ones(1, 1)
 POINT = {"normals": X, "view_dirs": X, "albedo": X, "roughness": ONE, "metallic": ONE, "specular": X, "diffuse": X}
+shaded, asked = lambda **others: ops.split_sum_shade(**POINT | others), ops.light_queries
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (
-            lambda: ops.split_sum_shade(**POINT | {"roughness": 0.5}),
-            "split_sum_shade: roughness must be a tensor, got float",
-        ),
-        (
-            lambda: ops.split_sum_shade(**POINT | {"normals": [0, 0, 1]}),
-            "split_sum_shade: normals must be a tensor, got list",
-        ),
-        (lambda: ops.split_sum_shade(**POINT | {"diffuse": 1}), "split_sum_shade: diffuse must be a tensor, got int"),
-        (lambda: ops.light_queries(X, None, ONE), "light_queries: view_dirs must be a tensor, got NoneType"),
-        (
-            lambda: ops.light_queries(X, X.to_sparse(), ONE),
-            "light_queries: view_dirs must be dense, got torch.sparse_coo",
-        ),
+        (lambda: shaded(roughness=0.5), "split_sum_shade: roughness must be a tensor, got float"),
+        (lambda: shaded(normals=[0, 0, 1]), "split_sum_shade: normals must be a tensor, got list"),
+        (lambda: shaded(diffuse=1), "split_sum_shade: diffuse must be a tensor, got int"),
+        (lambda: asked(X, None, ONE), "light_queries: view_dirs must be a tensor, got NoneType"),
+        (lambda: asked(X, X.to_sparse(), ONE), "light_queries: view_dirs must be dense, got torch.sparse_coo"),
         (lambda: ops.linear_to_srgb(np.ones(3)), "linear_to_srgb: linear must be a tensor, got ndarray"),
         (
             lambda: ops.occlusion_factors(X, X, X, lobe_dirs=X, roughness=ONE, environment=X),
             "occlusion_factors: scene must be a MeshScene, got Tensor",
         ),
         (lambda: ops.light.sample_ggx_lobe(X, ONE, 2.5), "sample_ggx_lobe: n_samples must be of type int, got float"),
-        (
-            lambda: ops.split_sum_shade(**POINT | {"compensate": "no"}),
-            "split_sum_shade: compensate must be of type bool, got str",
-        ),
+        (lambda: shaded(compensate="no"), "split_sum_shade: compensate must be of type bool, got str"),
     ],
 )
 def test_an_argument_of_another_type_is_named_in_one_line(call, words):

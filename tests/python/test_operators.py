@@ -6,30 +6,12 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
+import op_cases
 import pytest
 import reference
 import torch
 from bench.hash_grid import SPEC
-from op_cases import (
-    CASES,
-    EVERY,
-    ON_THE_CPU_ALONE,
-    OPERATORS,
-    cached_occlusion_inputs,
-    cached_visibility_inputs,
-    check_against_the_cpu,
-    field_gradients,
-    indirect_inputs,
-    lookup_inputs,
-    mixed_sums_inputs,
-    pixel_inputs,
-    query_inputs,
-    sdf_field_inputs,
-    shared_inputs,
-    sparse_inputs,
-    split_sum_inputs,
-    truth,
-)
+from op_cases import CASES, EVERY, ON_THE_CPU_ALONE, OPERATORS, check_against_the_cpu, truth
 from op_checks import arguments_of, as_tuple, check_op, devices, floats, generator, grad_leaves, has_cuda_kernel, lib
 from splitnerf import _core
 from splitnerf.ops.training import quadratic_entropy
@@ -50,7 +32,7 @@ TWICE = {"sparse_product"}  # whose gradient has gradients
 
 def smaller(name: str, dtype: torch.dtype, n: int | None = None) -> tuple:
     """A case for differences; with `n` only so many of its points, where each is worked out by itself."""
-    inputs = indirect_inputs(dtype, 0, 3, 12) if name == "split_sum_shade" else EVERY[name](dtype)
+    inputs = op_cases.indirect_inputs(dtype, 0, 3, 12) if name == "split_sum_shade" else EVERY[name](dtype)
     if name == "surface_weights":
         inputs[1][5] *= 1e5  # too short a gradient has none
     if n is None:
@@ -83,20 +65,20 @@ def results(op: str, inputs: tuple) -> list[torch.Tensor]:
 
 def deep_light(dtype: torch.dtype) -> tuple:
     """Spherical harmonics whose sums fall below 0 in places."""
-    inputs = lookup_inputs(dtype, 300)
+    inputs = op_cases.lookup_inputs(dtype, 300)
     return (*inputs[:3], inputs[3] * torch.where(torch.arange(169) == 0, 0.1, 3.0)[:, None].to(dtype), *inputs[4:])
 
 
 def far_points(dtype: torch.dtype) -> tuple:
     """Some lie off the mesh by more than the radius in which vertices count at first, some by more than any."""
-    x, normals, *rest = cached_visibility_inputs(dtype)
+    x, normals, *rest = op_cases.cached_visibility_inputs(dtype)
     heights = torch.tensor([0.2, 1.5, 3.0, 5.0, 0.0, 1.2, 2.5, 9.0, 99.0]).to(dtype)[:, None]
     return x + normals * rest[4] * heights, normals, *rest
 
 
 def short_gradients(dtype: torch.dtype) -> tuple:
     """Of lengths from 1e-5 to 1, on both sides of the least that has a direction."""
-    gradients, *rest = field_gradients(dtype)
+    gradients, *rest = op_cases.field_gradients(dtype)
     return gradients * torch.logspace(-5, -0.3, 40).to(dtype)[torch.arange(40) * 7 % 40][:, None], *rest
 
 
@@ -109,34 +91,28 @@ def annealed(anneal: float, dtype: torch.dtype) -> tuple:
 # Other settings of the same operators: what the first case of each does not reach.
 OTHERS = [
     *(
-        ("split_sum_shade", lambda t, mode=mode, gain=gain: split_sum_inputs("cpu", t, mode, gain, 1, 300))
+        ("split_sum_shade", lambda t, mode=mode, gain=gain: op_cases.split_sum_inputs("cpu", t, mode, gain, 1, 300))
         for mode in (0, 1)
         for gain in (False, True)
     ),
-    ("light_queries", lambda t: query_inputs("cpu", t, False, 300)),
-    ("shade_sums", lambda t: mixed_sums_inputs(300, t, compensate=False)),
+    ("light_queries", lambda t: op_cases.query_inputs("cpu", t, False, 300)),
+    ("shade_sums", lambda t: op_cases.mixed_sums_inputs(300, t, compensate=False)),
     *(("surface_weights", lambda t, anneal=anneal: annealed(anneal, t)) for anneal in (0.0, 1.0)),
-    ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in sparse_inputs(t))),
+    ("sparse_product", lambda t: tuple(0.3 * x if x.is_floating_point() else x for x in op_cases.sparse_inputs(t))),
     ("light_lookup", deep_light),
-    ("summed_light", lambda t: shared_inputs(40, dtype=t, with_sent=False)),
-    ("summed_light", lambda t: shared_inputs(700, dtype=t)),
-    *(
-        ("split_sum_shade", lambda t, channels=channels: indirect_inputs(t, 1, channels, 40, stacked=True))
-        for channels in (1, 3)
-    ),
+    ("summed_light", lambda t: op_cases.shared_inputs(40, dtype=t, with_sent=False)),
+    ("summed_light", lambda t: op_cases.shared_inputs(700, dtype=t)),
+    *(("split_sum_shade", lambda t, n=n: op_cases.indirect_inputs(t, 1, n, 40, stacked=True)) for n in (1, 3)),
     ("cached_visibility", far_points),
-    ("pixel_losses", lambda t: (*pixel_inputs(600, t), False)),
+    ("pixel_losses", lambda t: (*op_cases.pixel_inputs(600, t), False)),
     ("gradient_losses", short_gradients),
     *(
         # Tiles of 64 points.
-        ("sdf_field", lambda t, n=n, n_active=n_active: (*(x := sdf_field_inputs(n, t))[:13], n_active, x[14]))
+        ("sdf_field", lambda t, n=n, n_active=n_active: (*(x := op_cases.sdf_field_inputs(n, t))[:13], n_active, x[14]))
         for n, n_active in ((1, 3), (63, 0), (64, 3), (65, 2), (1500, 3))
     ),
     *(
-        (
-            "quadratic_entropy",
-            lambda t, n=n, shift=shift: (2 * torch.randn(n, 5, generator=generator(), dtype=t) + shift,),
-        )
+        ("quadratic_entropy", lambda t, n=n, x=shift: (2 * torch.randn(n, 5, generator=generator(), dtype=t) + x,))
         for n, shift in ((1, 0.0), (2, 0.0), (31, 1000.0), (200, 1000.0))
     ),
 ]
@@ -218,8 +194,8 @@ def read_in_16_bits(name: str) -> tuple:
 
 # Forms of arguments that are not in the case of the operator.
 FORMS = [
-    ("cached_occlusion", lambda: cached_occlusion_inputs(torch.float32, with_hits=False), ()),
-    ("cached_visibility", lambda: cached_visibility_inputs(torch.float32, with_hits=False), ()),
+    ("cached_occlusion", lambda: op_cases.cached_occlusion_inputs(torch.float32, with_hits=False), ()),
+    ("cached_visibility", lambda: op_cases.cached_visibility_inputs(torch.float32, with_hits=False), ()),
     ("hash_encode", lambda: read_in_16_bits("hash_encode"), (0,)),
     ("sdf_values", lambda: read_in_16_bits("sdf_values"), ()),
     ("hash_encode_backward_positions", lambda: read_in_16_bits("hash_encode_backward_positions"), ()),
@@ -316,7 +292,7 @@ NO_SAMPLE, HALF_AND_NONE = torch.zeros(3, dtype=torch.int64), torch.tensor([0.5,
 CELLS, TWO_RAYS = torch.ones(4, 4, 4, dtype=torch.uint8), torch.eye(3)[:2]
 # The others without a point, or without a sample on two rays.
 EMPTY = {
-    "light_queries": lambda t: query_inputs("cpu", t, True, 0),
+    "light_queries": lambda t: op_cases.query_inputs("cpu", t, True, 0),
     "march_rays": lambda t: (NONE_3, NONE_3, NONE, CELLS, 1.5, 0.1, 64),
     "sample_rays": lambda t: (NONE_3, NONE_3, NONE, *CASES["sample_rays"](torch.float32)[3:]),
     "draw_rays": lambda t: (NONE, 0, *CASES["draw_rays"](torch.float32)[2:]),

@@ -2,21 +2,10 @@
 
 import math
 
+import op_cases
 import pytest
 import torch
-from op_cases import (
-    BOX,
-    CASES,
-    HASH_SPEC,
-    SDF_SPEC,
-    STEP,
-    bumpy_field,
-    field_rays,
-    full_cells,
-    hash_inputs,
-    sampling_settings,
-    sdf_field_inputs,
-)
+from op_cases import BOX, CASES, HASH_SPEC, STEP, bumpy_field, field_rays, full_cells, hash_inputs, sdf_field_inputs
 from op_checks import DEVICES, check_error, generator, grad_leaves, lib, on_threads
 from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, march_rays, surface_weights
@@ -27,7 +16,8 @@ from splitnerf.ops.sdf import SdfNetwork, sample_rays
 def sampled(field, rays: tuple, cells: torch.Tensor | None = None, **settings) -> tuple:
     """The samples of a field or of its network, the numbers of distances asked for, and the number of samples found."""
     network = field if isinstance(field, SdfNetwork) else field.network()
-    return sample_rays(*rays, full_cells() if cells is None else cells, network, **sampling_settings(**settings))
+    settings = op_cases.sampling_settings(**settings)
+    return sample_rays(*rays, full_cells() if cells is None else cells, network, **settings)
 
 
 def depth_between(f, f_next, s: float):
@@ -44,10 +34,8 @@ def stretches(field, samples, origins, directions, s: float, anneal: float = 1.0
     slope = (f.diff() / apart).clamp(-1, 1)
     half = -0.5 * STEP * ((0.5 - 0.5 * slope) * (1 - anneal) + torch.relu(-slope) * anneal)
     between = depth_between(f[:-1], torch.minimum(f[1:], (f[:-1] + f[1:] - apart) / 2), s)
-    rendered = torch.maximum(
-        depth_between(f[:-1] - half, f[:-1] + half, s), depth_between(f[1:] - half, f[1:] + half, s)
-    )
-    tau, passed = torch.maximum(between, rendered), depth_between(f[:-1], f[1:], s)
+    drawn = torch.maximum(depth_between(f[:-1] - half, f[:-1] + half, s), depth_between(f[1:] - half, f[1:] + half, s))
+    tau, passed = torch.maximum(between, drawn), depth_between(f[:-1], f[1:], s)
     depth, weights = 0.0, torch.zeros(len(x), dtype=torch.float64)
     for i in range(len(x) - 1):
         if samples.ray_indices[i + 1] != samples.ray_indices[i]:
@@ -305,7 +293,7 @@ def test_the_module_reads_a_copy_that_follows_the_parameter():
 
 def exact_field(table_dtype=None) -> SdfField:
     torch.manual_seed(0)
-    field = SdfField(SDF_SPEC, BOX, table_dtype=table_dtype)
+    field = SdfField(op_cases.SDF_SPEC, BOX, table_dtype=table_dtype)
     with torch.no_grad():
         field.grid.table.copy_((torch.randn(field.grid.table.shape) * 16).round() / 64)
     return field
@@ -320,10 +308,7 @@ def test_the_field_reads_the_copy():
     a, b = rounded.sample(x), plain.sample(x)
     assert torch.equal(a.outputs, b.outputs) and torch.equal(a.gradient, b.gradient)
     torch.testing.assert_close(rounded.sdf(x), a.sdf)  # with gradients
-    o, d, jitter = (t.float() for t in field_rays())
-    samples = [
-        sample_rays(o, d, jitter, full_cells(), field.network(), **sampling_settings()) for field in (rounded, plain)
-    ]
+    samples = [sampled(field, tuple(t.float() for t in field_rays())) for field in (rounded, plain)]
     assert len(samples[0][0].t_starts) > 30
     for got, expected in zip((*samples[0][0], samples[0][1]), (*samples[1][0], samples[1][1])):
         assert torch.equal(got, expected)

@@ -6,16 +6,9 @@ import pytest
 import torch
 from op_cases import query_inputs, shared_inputs, split_sum_inputs, sums_inputs
 from op_checks import check_error, lib, unit
+from splitnerf import ops
 from splitnerf.ops import light_queries, split_sum_shade
-from splitnerf.ops.shading import (
-    SHADED,
-    LightSums,
-    brdf_lut,
-    monte_carlo_light,
-    shade_sums,
-    summed_correction,
-    summed_light,
-)
+from splitnerf.ops.shading import SHADED, LightSums, brdf_lut, monte_carlo_light, shade_sums, summed_light
 from stability.cases import drawn_directions
 
 
@@ -36,15 +29,7 @@ def test_an_option_that_is_not_known_is_named():
     check_error(ask, "light_queries", "query", "mean", "median")
 
 
-SMOOTH = (
-    [0.887, -0.036, -0.460],
-    [-0.849, 0.157, 0.504],
-    [0.8, 0.5, 0.2],
-    [0.0],
-    [0.95],
-    [0.5, 0.4, 0.45],
-    [1.0, 1.0, 0.5],
-)
+SMOOTH = ([0.887, -0.036, -0.46], [-0.849, 0.157, 0.504], [0.8, 0.5, 0.2], [0.0], [0.95], [0.5, 0.4, 0.45], [1, 1, 0.5])
 GRAZED = [0.0, 0.0, 1.0], [1.0, 0.0, 6.27e-4], [0.009, 0.0, 0.002], [0.0], [0.0], [0.7, 0.4, 0.05], [0.0, 0.0, 0.0]
 
 
@@ -97,10 +82,8 @@ def test_one_light_for_the_whole_lobe_is_the_split_sum(compensate, turned):
     metal = torch.ones_like(metallic)
 
     def lobe(albedo, metallic=metal):  # albedo F1 + F2, E_d of a dielectric
-        point = normals, view_dirs
-        return split_sum_shade(
-            *point, albedo=albedo, roughness=roughness, metallic=metallic, specular=one, diffuse=black
-        )
+        material = {"albedo": albedo, "roughness": roughness, "metallic": metallic}
+        return split_sum_shade(normals, view_dirs, **material, specular=one, diffuse=black)
 
     sums = LightSums(lobe(one) * light, lobe(black) * light, diffuse, lobe(black, 0 * metal) * light)
     material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": compensate}
@@ -121,5 +104,5 @@ def test_the_correction_is_the_sum_less_the_split_by_its_share():
     material = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "compensate": True}
     summed = shade_sums(normals, view_dirs, **material, sums=summed_light(normals, view_dirs, roughness, *light))
     named = dict(zip(("directions", "solid_angles", "radiance", "visible", "sent"), light))
-    found = summed_correction(normals, view_dirs, **material, split=split, share=share, **named)
+    found = ops.shading.summed_correction(normals, view_dirs, **material, split=split, share=share, **named)
     torch.testing.assert_close(found, (summed - split) * share[:, None])

@@ -167,14 +167,7 @@ def test_vertices_out_of_reach_are_refused(value):
 
 @pytest.mark.parametrize(
     ("n_vertices", "columns", "faces"),
-    [
-        (3, 3, [[1, 2, 3]]),
-        (3, 3, [[-1, 0, 1]]),
-        (3, 3, [[1 << 32, 1, 2]]),
-        (3, 3, []),
-        (0, 3, [[0, 1, 2]]),
-        (3, 2, [[0, 1, 2]]),
-    ],
+    [(3, 3, [1, 2, 3]), (3, 3, [-1, 0, 1]), (3, 3, [1 << 32, 1, 2]), (3, 3, []), (0, 3, [0, 1, 2]), (3, 2, [0, 1, 2])],
 )
 def test_meshes_that_are_none_are_refused(n_vertices, columns, faces):
     with pytest.raises(ValueError):

@@ -9,14 +9,15 @@ from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import APART, EDGE, NormalEquations, Prior
 from splitnerf.refinement.similar_texels import SimilarTexels, weighted_medians
+from splitnerf.refinement.texels import TexelPairs
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
 
-def chain(**weights: float) -> Prior:
-    """A prior of texels 0 - 1 - 2, with one weight for all unknowns."""
+def chain(frame: torch.Tensor | None = None, m: int = 3, **weights: float) -> Prior:
+    """A prior of m texels, 1 - 2 and 0 - 1 joined, with one weight for all unknowns; `frame` turns tilts of 1 into the frame of 0."""
     of_all = {name: torch.full((N_UNKNOWNS,), weights.get(name, 0.0)) for name in ("smooth", "flat", "anchor")}
-    frames, like = torch.eye(2).expand(2, 2, 2), weights.get("like", 0.0)
-    return Prior(pairs=torch.tensor([[0, 1], [1, 2]]), frames=frames, groups=GROUPS, like=like, **of_all)
+    pairs = TexelPairs(m, np.array([[1, 2], [0, 1]]), torch.empty(0, 2, 2) if frame is None else frame[None])
+    return Prior(pairs=pairs, groups=GROUPS, like=weights.get("like", 0.0), **of_all)
 
 
 def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = None, n_steps: int = 60) -> torch.Tensor:
@@ -40,15 +41,14 @@ def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = No
 def test_normals_across_a_seam_are_compared_in_one_frame():
     """A tilt that is one direction of space in two frames, one of them turned, is no difference."""
     frame = torch.tensor([[0.6, -0.8], [0.8, 0.6]])
-    prior = chain(flat=1.0)._replace(frames=torch.stack([frame, torch.eye(2)]))
+    prior = chain(frame, flat=1.0)
     observed = torch.zeros(3, N_UNKNOWNS)
     observed[1:, 5:] = torch.tensor([0.3, -0.1])
     observed[0, 5:] = frame @ observed[1, 5:]
     torch.testing.assert_close(fitted(prior, observed), observed)
     values, rows = torch.randn(3, N_UNKNOWNS), torch.randn(2, N_UNKNOWNS)
-    torch.testing.assert_close(
-        (prior.differences(values) * rows).sum(), (values * prior.differences_adjoint(rows, 3)).sum()
-    )
+    pairs = prior.pairs
+    torch.testing.assert_close((pairs.differences(values) * rows).sum(), (values * pairs.adjoint(rows)).sum())
 
 
 def test_small_differences_are_smoothed_and_edges_are_kept():
@@ -111,7 +111,7 @@ def test_the_equations_find_what_linear_observations_say():
     generator = torch.Generator().manual_seed(0)
     truth = torch.rand(6, N_UNKNOWNS, generator=generator)
     start = torch.zeros_like(truth)
-    prior = chain(smooth=1e-9, anchor=1e-9)
+    prior = chain(m=6, smooth=1e-9, anchor=1e-9)
     equations = NormalEquations(start, prior, 0.5)
     texels = torch.arange(6).repeat(40).repeat_interleave(2)[:, None].expand(-1, 4)
     shares = torch.full((480, 4), 0.25)
@@ -127,7 +127,7 @@ def test_the_equations_find_what_linear_observations_say():
 
 
 def test_the_prior_takes_texels_along_that_no_photo_shows():
-    prior = chain(smooth=10.0, anchor=1e-6)
+    prior = chain(m=4, smooth=10.0, anchor=1e-6)
     equations = NormalEquations(torch.zeros(4, N_UNKNOWNS), prior, 0.0)
     one = torch.eye(N_UNKNOWNS)
     jacobian = torch.stack([one[:3], one[3:6], one[4:]]).repeat_interleave(2, 0)

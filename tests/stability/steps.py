@@ -12,6 +12,7 @@ from splitnerf.refinement.light import LOG_LIMIT, EnvironmentLight, footprints
 from splitnerf.refinement.light_equations import LARGEST, LightEquations
 from splitnerf.refinement.light_equations import Rows as LightRows
 from splitnerf.refinement.normal_equations import NormalEquations, Prior
+from splitnerf.refinement.texels import TexelPairs
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 from splitnerf.training.exposure import (
     BRIGHTEST,
@@ -74,10 +75,9 @@ def long_run(draw: Draw, n: int) -> tuple[Tensor, Rows]:
 @lru_cache(maxsize=1)
 def chain() -> Prior:
     """A chain of texels: neighbours are joined, and each is held a little where it is."""
-    pairs = torch.arange(TEXELS - 1)[:, None] + torch.arange(2)
+    pairs = TexelPairs(TEXELS, np.arange(TEXELS - 1)[:, None] + np.arange(2), torch.empty(0, 2, 2))
     weights = {name: torch.full((N_UNKNOWNS,), x) for name, x in (("smooth", 0.05), ("anchor", 1e-2))}
-    frames, flat = torch.eye(2).expand(len(pairs), 2, 2), torch.zeros(N_UNKNOWNS)
-    return Prior(pairs=pairs, frames=frames, groups=GROUPS, flat=flat, like=0.0, **weights)
+    return Prior(pairs=pairs, groups=GROUPS, flat=torch.zeros(N_UNKNOWNS), like=0.0, **weights)
 
 
 def texels_solved(draw: Draw, n: int) -> tuple[Tensor, Rows]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from splitnerf.errors import InputError
 from splitnerf.files import atomic_path
 
 BAND = 1 << 20  # texels encoded at a time
+Maps = list[np.ndarray | None]  # of :func:`encode_maps`
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
@@ -59,7 +59,7 @@ def glb_content(
         RuntimeError: See :func:`encode_maps`.
     """
     maps, material = encode_maps(path, asset, occlusion), asset.materials[0]
-    images = [None if pixels is None else Image.fromarray(pixels) for pixels in (maps.albedo, maps.orm, maps.normal)]
+    images = [None if pixels is None else Image.fromarray(pixels) for pixels in maps]
     pbr = PBRMaterial(
         name=asset.name,
         roughnessFactor=float(material.roughness),
@@ -121,10 +121,10 @@ def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
         OSError: A file cannot be written.
     """
     path = Path(path)
-    maps, material = encode_maps(path, asset, None), asset.materials[0]
-    images = {"map_Kd": ("albedo", maps.albedo), "norm": ("normal", maps.normal)}
-    if maps.orm is not None:
-        images |= {"map_Pr": ("roughness", maps.orm[..., 1]), "map_Pm": ("metallic", maps.orm[..., 2])}
+    (albedo, orm, normal), material = encode_maps(path, asset, None), asset.materials[0]
+    images = {"map_Kd": ("albedo", albedo), "norm": ("normal", normal)}
+    if orm is not None:
+        images |= {"map_Pr": ("roughness", orm[..., 1]), "map_Pm": ("metallic", orm[..., 2])}
     lines = [f"newmtl {asset.name}", "Kd " + " ".join(f"{c:.6g}" for c in material.albedo)]
     lines += [f"Pr {material.roughness:.6g}", f"Pm {material.metallic:.6g}", "illum 2"]
     written = [path, path.with_suffix(".mtl")]
@@ -223,11 +223,12 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
     surface.CreateInput("metallic", types.Float).Set(float(factors.metallic))
     coordinates = shader("uv", "UsdPrimvarReader_float2")
     coordinates.CreateInput("varname", types.String).Set("st")
-    for name, pixels, space, uses in (
-        ("albedo", maps.albedo, "sRGB", {"diffuseColor": "rgb"}),
-        ("orm", maps.orm, "raw", {"occlusion": "r", "roughness": "g", "metallic": "b"}),
-        ("normal", maps.normal, "raw", {"normal": "rgb"}),
-    ):
+    kinds = (
+        ("albedo", "sRGB", {"diffuseColor": "rgb"}),
+        ("orm", "raw", {"occlusion": "r", "roughness": "g", "metallic": "b"}),
+        ("normal", "raw", {"normal": "rgb"}),
+    )
+    for (name, space, uses), pixels in zip(kinds, maps):
         if pixels is None:
             continue
         file = folder / "textures" / f"{name}.png"
@@ -245,18 +246,9 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-@dataclass(frozen=True)
-class Maps:
-    """An asset's textures in the encoding of files, [h, w, 3] uint8, None where it has only a factor: albedo in sRGB;
-    occlusion (1 where there is none), roughness, metallic, linear; and (normal + 1) / 2."""
-
-    albedo: np.ndarray | None
-    orm: np.ndarray | None
-    normal: np.ndarray | None
-
-
 def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Maps:
-    """The textures of an asset's one material.
+    """The textures of an asset's one material in the encoding of files, [h, w, 3] uint8, None where it has only a factor: albedo in
+    sRGB; occlusion (1 where there is none), roughness, metallic, linear; and (normal + 1) / 2.
 
     Args:
         path: The file to be written, for messages.
@@ -285,11 +277,8 @@ def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Map
     if roughness_metallic is not None:
         open_share = np.broadcast_to(np.float32(1), roughness_metallic.shape[:2]) if occlusion is None else occlusion
         orm = encoded(lambda *bands: np.dstack(bands), open_share, roughness_metallic)
-    return Maps(
-        albedo=None if albedo is None else encoded(linear_to_srgb, albedo),
-        orm=orm,
-        normal=None if normal is None else encoded(lambda band: 0.5 * band + 0.5, normal),
-    )
+    albedo = None if albedo is None else encoded(linear_to_srgb, albedo)
+    return [albedo, orm, None if normal is None else encoded(lambda band: 0.5 * band + 0.5, normal)]
 
 
 def encoded(encode: Callable[..., np.ndarray], *maps: np.ndarray) -> np.ndarray:

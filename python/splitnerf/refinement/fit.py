@@ -179,7 +179,6 @@ class Refinement:
         smooth = max(1.0, self.patch_width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         self.prior = Prior(
             pairs=self.texels.pairs,
-            frames=self.texels.frames,
             smooth=smooth,
             flat=per_unknown(*FLAT),
             groups=GROUPS,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import torch
+from scipy.sparse import csr_array
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -77,12 +79,10 @@ def footprints(height: int, directions: Tensor) -> tuple[Tensor, Tensor]:
 
 def read(table: Tensor, texels: Tensor, shares: Tensor) -> Tensor:
     """[n, 3] the values of a flat map [t, 3] at footprints: bilinear."""
-    return sum(table.index_select(0, texels[:, c]) * shares[:, c, None] for c in range(4))
+    return F.embedding_bag(texels, table, per_sample_weights=shares, mode="sum")
 
 
 def read_adjoint(values: Tensor, texels: Tensor, shares: Tensor, n_texels: int) -> Tensor:
     """[t, 3] the sums of values [n, 3] by their footprints' shares: the transpose of :func:`read`."""
-    table = values.new_zeros(n_texels, 3)
-    for c in range(4):
-        table.index_add_(0, texels[:, c], values * shares[:, c, None])
-    return table
+    places = texels.numpy().astype(np.int32).ravel(), np.arange(0, texels.numel() + 1, 4, np.int32)
+    return torch.from_numpy(csr_array((shares.numpy().ravel(), *places), (len(values), n_texels)).T @ values.numpy())

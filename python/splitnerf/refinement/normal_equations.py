@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
+from splitnerf.refinement.texels import TexelPairs
 from splitnerf.refinement.unknowns import ROUGHNESS
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
@@ -18,8 +19,7 @@ class Prior(NamedTuple):
     """The prior of the unknowns where photos determine them poorly, in units of each unknown's mean curvature.
 
     Attributes:
-        pairs: [k, 2] int64, texels that are neighbours.
-        frames: [k, 2, 2] what takes the last two unknowns of the second of a pair into the frame of the first.
+        pairs: Texels that are neighbours.
         smooth: [n] weight of the differences between the steps of neighbours.
         flat: [n] weight of the differences d between the values of neighbours; their cost is log(1 + (d / EDGE)^2), so
             that small differences are smoothed and edges are kept (Black and Anandan 1996).
@@ -28,8 +28,7 @@ class Prior(NamedTuple):
         like: Weight of the distance d of the roughness to the usual one, whose cost is log(1 + (d / APART)^2).
     """
 
-    pairs: Tensor
-    frames: Tensor
+    pairs: TexelPairs
     smooth: Tensor
     flat: Tensor
     groups: tuple[int, ...]
@@ -38,22 +37,9 @@ class Prior(NamedTuple):
 
     def flatness(self, unknowns: Tensor) -> Tensor:
         """[k, n] the weights by which squared differences have the gradient of their cost at unknowns [m, n]."""
-        squared = (self.differences(unknowns) / EDGE).square().split(self.groups, dim=1)
+        squared = (self.pairs.differences(unknowns) / EDGE).square().split(self.groups, dim=1)
         lengths = torch.cat([part.sum(1, keepdim=True).expand_as(part) for part in squared], dim=1)
         return self.flat / (1.0 + lengths)
-
-    def differences(self, values: Tensor) -> Tensor:
-        """[k, n] the differences of neighbours' values [m, n], in the frame of the first of a pair."""
-        i, j = self.pairs.unbind(1)
-        other = torch.einsum("kab,kb->ka", self.frames, values[j, -2:])
-        return values[i] - torch.cat([values[j, :-2], other], dim=1)
-
-    def differences_adjoint(self, values: Tensor, m: int) -> Tensor:
-        """[m, n] the transpose of :meth:`differences`, of values [k, n]."""
-        i, j = self.pairs.unbind(1)
-        other = torch.einsum("kab,ka->kb", self.frames, values[:, -2:])
-        sums = values.new_zeros(m, values.shape[1]).index_add_(0, i, values)
-        return sums.index_add_(0, j, -torch.cat([values[:, :-2], other], dim=1))
 
 
 class NormalEquations:
@@ -95,7 +81,7 @@ class NormalEquations:
 
     def _differences(self, values: Tensor, weights: Tensor) -> Tensor:
         """Gradient of half the weighted squared differences of neighbours."""
-        return self.prior.differences_adjoint(self.prior.differences(values) * weights, len(values))
+        return self.prior.pairs.adjoint(self.prior.pairs.differences(values) * weights)
 
     @torch.no_grad()
     def step(self, unknowns: Tensor, usual: Tensor | None, n_iterations: int = 20) -> Tensor:
@@ -113,8 +99,7 @@ class NormalEquations:
             unlike[:, ROUGHNESS] = unknowns[:, ROUGHNESS] - usual
             pull[:, ROUGHNESS] = prior.like * typical[ROUGHNESS] / (1.0 + (unlike[:, ROUGHNESS] / APART).square())
         system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
-        of_pairs = sum(torch.zeros_like(unknowns).index_add_(0, end, smooth) for end in prior.pairs.unbind(1))
-        inverses = torch.linalg.inv(system + torch.diag_embed(of_pairs))
+        inverses = torch.linalg.inv(system + torch.diag_embed(prior.pairs.sums(smooth)))
         down = self.gradient + anchor * (unknowns - self.start) + pull * unlike + self._differences(unknowns, flat)
         return conjugate_gradients(
             lambda x: torch.einsum("mnk,mk->mn", system, x) + self._differences(x, smooth),

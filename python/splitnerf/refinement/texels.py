@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 from torch import Tensor
 from torch.nn import functional as F
@@ -69,6 +70,43 @@ def bilinear_footprints(uv: np.ndarray, size: int) -> Footprints:
     return Footprints(torch.from_numpy(texels), torch.from_numpy(weights.astype(np.float32)))
 
 
+class TexelPairs:
+    """Pairs of neighbours among m texels, with the differences of their values as a linear map.
+
+    Args:
+        m: The number of texels.
+        pairs: [k, 2] the texels of each pair.
+        frames: [q, 2, 2] of the last q pairs what takes x and y of a tangent-space normal at the second into the frame of the first; those
+            of the others have one frame.
+    """
+
+    def __init__(self, m: int, pairs: np.ndarray, frames: Tensor):
+        k = len(pairs)
+        self.ends, self.frames, self._turned = torch.from_numpy(pairs), frames, slice(k - len(frames), k)
+        entries = np.tile(np.float32([1, -1]), k), pairs.astype(np.int32).ravel(), np.arange(0, 2 * k + 1, 2, np.int32)
+        self._apart = csr_array(entries, (k, m))
+        self._back = self._apart.T.tocsr()
+        self._sum = abs(self._back)
+
+    def differences(self, values: Tensor) -> Tensor:
+        """[k, n] the first's values [m, n] minus the second's in the frame of the first; the last two are a normal's x and y."""
+        apart = torch.from_numpy(self._apart @ values.numpy())
+        tilts = values[self.ends[self._turned, 1], -2:]
+        apart[self._turned, -2:] += tilts - torch.einsum("kab,kb->ka", self.frames, tilts)
+        return apart
+
+    def adjoint(self, values: Tensor) -> Tensor:
+        """[m, n] the transpose of :meth:`differences`, of values [k, n]."""
+        back, tilts = torch.from_numpy(self._back @ values.numpy()), values[self._turned, -2:]
+        change = tilts - torch.einsum("kab,ka->kb", self.frames, tilts)
+        back[:, -2:] = back[:, -2:].index_add(0, self.ends[self._turned, 1], change)
+        return back
+
+    def sums(self, values: Tensor) -> Tensor:
+        """[m, n] the sums of values [k, n] of the pairs that a texel is in."""
+        return torch.from_numpy(self._sum @ values.numpy())
+
+
 class AssetTexels:
     """The covered texels of an asset's textures, m of them, and the mesh that they lie on.
 
@@ -81,8 +119,7 @@ class AssetTexels:
         chart: [m] the number of each texel's chart.
         positions: [m, 3] the texels' points on the mesh.
         start: [m, 8] the texture's values.
-        pairs: [k, 2] int64 neighbours within a chart, and the nearest texels of two charts along their seams.
-        frames: [k, 2, 2] what takes x and y of a tangent-space normal at the second of a pair into the frame of the first.
+        pairs: Neighbours within a chart, and then the nearest texels of two charts along their seams.
 
     Raises:
         ValueError: The asset has another form.
@@ -104,9 +141,8 @@ class AssetTexels:
         inside = neighbours(covered, self.chart, self.size)
         across = across_seams(inside, self.chart, self.positions, normals)
         frames = frames_of(normals, tangents)
-        self.pairs = torch.from_numpy(np.concatenate([inside, across]))
         turns = np.einsum("kax,kbx->kab", *(frames[end] for end in across.T))
-        self.frames = torch.from_numpy(np.concatenate([np.broadcast_to(np.eye(2), (len(inside), 2, 2)), turns])).float()
+        self.pairs = TexelPairs(len(self.index), np.concatenate([inside, across]), torch.from_numpy(turns).float())
 
     def rows(self, footprints: Footprints) -> Tensor:
         """[n, 4] the covered texels that points read; texels outside the charts have the value of the nearest

@@ -205,22 +205,15 @@ def place_samples(
 
 
 def add_corrections(
-    mean: Tensor,
-    correction: Tensor,
-    at: Tensor,
-    spread: ShadingSubset,
-    ray_indices: Tensor,
-    shares: Tensor,
-    opacity: Tensor,
+    mean: Tensor, added: Tensor, at: Tensor, spread: ShadingSubset, ray_indices: Tensor, shares: Tensor, opacity: Tensor
 ) -> Tensor:
-    """The rays' colours [n_rays, 3] with corrections [m, 3] of their shaded samples `at` [m], each by the share of the ray's
+    """The rays' colours [n_rays, 3] with corrections `added` [m, 3] of their shaded samples `at` [m], each by the share of the ray's
     opacity that the sample's segment carries; `shares` [n_shaded] is the weight that each shaded sample stands for."""
     rays = ray_indices.index_select(0, spread.shaded.index_select(0, at))
     carried = shares.new_zeros(len(spread.representatives)).index_add(0, spread.segment, shares)
-    part = carried.index_select(0, spread.segment.index_select(0, at)) / opacity.index_select(0, rays).clamp(
-        min=MIN_OPACITY
-    )
-    return mean.index_add(0, rays, correction * part[:, None])
+    opacity = opacity.index_select(0, rays).clamp(min=MIN_OPACITY)
+    part = carried.index_select(0, spread.segment.index_select(0, at)) / opacity
+    return mean.index_add(0, rays, added * part[:, None])
 
 
 def render_rays(

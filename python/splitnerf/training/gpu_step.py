@@ -156,15 +156,8 @@ class GpuStep(Step):
         """The host's decisions about a step, except sizes: steps with equal decisions run the same work."""
         c, model = self.model.config, self.model
         since = step % light_period(c) + 1 if light_moves(c, step) else 0
-        return (
-            model.sdf_field.grid.n_active,
-            since,
-            progress >= c.constants.priors_from,
-            self.is_held(progress),
-            has_shape_priors(c, progress),
-            self.mesh.made_at,
-            model.has_mesh,
-        )
+        priors = progress >= c.constants.priors_from, self.is_held(progress), has_shape_priors(c, progress)
+        return model.sdf_field.grid.n_active, since, *priors, self.mesh.made_at, model.has_mesh
 
     def _recorded(self, function: Callable, batch: Batch, found: FoundSamples, light: EvaluatedLight) -> Recorded:
         batch, found = tree_map(torch.clone, (batch, found))
