@@ -353,14 +353,12 @@ class Refinement:
         colours = shaded.colours
         of_other = errors.flip(1).flatten(0, 1)
         weights_of_rays = weights.repeat_interleave(2, 0)
-        if self.settings.light_step > 0:
-            slopes = (
-                torch.autograd.grad(colours.sum(), shaded.radiance, retain_graph=True)[0] * shaded.visible[..., None]
-            )
-            self.light_equations.add(Rows(shaded.texels, shaded.shares, slopes, weights_of_rays), shaded.sky, of_other)
-        jacobian = torch.stack(
-            [torch.autograd.grad(colours[:, c].sum(), unknowns, retain_graph=c < 2)[0] for c in range(3)], dim=1
-        )
+        inputs = unknowns, shaded.radiance
+        of_channels = [torch.autograd.grad(colours[:, c].sum(), inputs, retain_graph=c < 2) for c in range(3)]
+        jacobian, slopes = torch.stack([x for x, _ in of_channels], dim=1), sum(x for _, x in of_channels)
+        if self.settings.light_step > 0:  # a channel depends on the light's own alone
+            rows = Rows(shaded.texels, shaded.shares, slopes * shaded.visible[..., None], weights_of_rays)
+            self.light_equations.add(rows, shaded.sky, of_other)
         self.equations.add(texels, shares, jacobian, weights_of_rays, of_other)
         self.n_batches += 1
         return float(batch.squared().mean())
