@@ -28,7 +28,7 @@ from splitnerf.refinement import stage as stage_module
 from splitnerf.refinement.fit import FitSettings, Refinement
 from splitnerf.refinement.pixels import covered_pixels
 from splitnerf.refinement.refine import OtherState, refine_folder
-from splitnerf.refinement.stage import Stage
+from splitnerf.refinement.stage import Stage, decibels
 from splitnerf.run_folder import data_of
 from splitnerf_tools.report.sections import refinement_section
 from tiny_runs import refused, train
@@ -419,7 +419,9 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     assert re.search(r"100% .* refinement, step 4, photos [1-4]\d\.\d\d dB", printed)
     summary = pipeline.refinement_summary(folder)
     before, after = summary["photos_psnr"]
-    assert after > before and summary["steps"] == 4
+    first, *_, last = json.loads((folder / "refinement.json").read_text())["sweeps"]
+    assert after > before and (before, after) == (decibels(first["error"]), decibels(last["error"]))
+    assert summary["steps"] == 4
     for changes, told in (
         ({}, f"{after:.2f} dB"),
         ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),

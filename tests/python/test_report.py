@@ -289,9 +289,9 @@ def test_the_object_comes_first_then_what_was_promised_then_scores(tmp_path, glb
 
 def test_scores_are_said_in_words():
     """Higher is better, lower is better; the limits belong to the better word; what is missing has no row."""
-    words = "good", "fair", "fair", "poor"
-    rows = [({"novel_view": {"psnr": value}}, word) for value, word in zip((30.0, 29.9, 25.0, 24.9), words)]
-    rows += [({"normal_mae_deg": value}, word) for value, word in zip((5.0, 5.1, 12.0, 12.1), words)]
+    words = "good", "good", "fair", "fair", "poor"
+    rows = [({"novel_view": {"psnr": value}}, word) for value, word in zip((35.0, 30.0, 29.9, 25.0, 24.9), words)]
+    rows += [({"normal_mae_deg": value}, word) for value, word in zip((1.0, 5.0, 5.1, 12.0, 12.1), words)]
     for evaluation, word in rows:
         assert [row["word"] for row in graded(evaluation | {"relight": None, "f_score": None})] == [word], evaluation
     (angle,) = graded({"normal_mae_deg": 7.12345})

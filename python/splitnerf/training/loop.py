@@ -39,10 +39,10 @@ from splitnerf.training.schedule import (
 from splitnerf.training.start import COMPARED_FROM, StartShape, fit_to, start_shape
 from splitnerf.training.step import Step, StepNumbers
 
-# Steps of a first shape that is not sure, and of a sphere beside it: the fewest that tell, and the most; wrong shapes lead at first.
+# Steps of a first shape that is not sure, and of a sphere beside it: the first of which a lead counts, the fewest that tell, and the most.
 # The decibels by which a shape may be behind, and those that it must lead by, to be told before the most are made; the steps over
 # which a lead is the mean; the share of the run's time or steps that both may take.
-FEWEST_TRIED, MOST_TRIED, BEHIND, AHEAD, LED, TRIED_SHARE = 400, 1000, 0.5, 1.0, 100, 0.3
+FIRST_LEAD, FEWEST_TRIED, MOST_TRIED, BEHIND, AHEAD, LED, TRIED_SHARE = 200, 500, 1000, 0.5, 1.0, 100, 0.3
 PAUSE = 0.1  # seconds between two questions whether a pause has ended
 
 
@@ -276,7 +276,8 @@ def begun(
 
 def better_of(sphere: Training, other: Training) -> Training:
     """Of two trainings before their first step the one that goes on: the first one unless the other explains the photos better
-    after a thousand steps, or as much better as steps are missing where there is no time for these."""
+    after a thousand steps, or as much better as steps are missing where there is no time for these. What it has gained since
+    :data:`FIRST_LEAD` counts once more: a wrong shape leads at first, and loses its lead."""
     c, run, observer, found = sphere.config, sphere.run, sphere.observer, []
     n_steps = max(1, min(MOST_TRIED, int(0.5 * TRIED_SHARE * c.run.steps)))
     ends = time.monotonic() + (TRIED_SHARE * 60.0 * c.training_minutes or math.inf)
@@ -290,7 +291,9 @@ def better_of(sphere: Training, other: Training) -> Training:
                     each.refresh()
                     each.advance(None)
             found.append((other.log.psnr or 0.0) - (sphere.log.psnr or 0.0))
-            lead, n = float(np.mean(found[-LED:])), len(found)
+            n = len(found)
+            now, first = (float(np.mean(found[max(0, end - LED) : end])) for end in (n, min(n, FIRST_LEAD)))
+            lead = 2 * now - first
         is_better = n >= min(FEWEST_TRIED, n_steps) and lead > AHEAD * (1.0 - n / n_steps)
         better = other if is_better else sphere
         better.settle()
