@@ -221,9 +221,9 @@ SPLITNERF_HD SpecularAlbedo<T> specular_albedo(T fr, T rest_of_fr, const LutSamp
   const T f1 = table.value.x, f2 = table.value.y, single = fr * (T(1) - table.lost) + rest_of_fr * f2;
   if (!compensate) return {single, f1, rest_of_fr, -fr, table.lost + rest_of_fr * f1, single};
   const ScatteringGain<T> gain = scattering_gain(fr, table.lost, compensate);
-  const T inv_s = T(1) / (T(1) - table.lost);
-  return {single * gain.value, f1 * gain.value + single * gain.d_fr, rest_of_fr * gain.value,
-          rest_of_fr * fr * (f2 * inv_s * inv_s - T(1)), rest_of_fr * (table.lost + f1 * gain.value), single};
+  const T inv_s = T(1) / (T(1) - table.lost), d_lost = rest_of_fr * fr * (f2 * inv_s * inv_s - T(1));
+  const T d_fr = f1 * gain.value + single * gain.d_fr, rest = rest_of_fr * (table.lost + f1 * gain.value);
+  return {single * gain.value, d_fr, rest_of_fr * gain.value, d_lost, rest, single};
 }
 
 // Directional albedo E = gain E_d of a dielectric layer; its partial derivatives are gain by E_d, and d_lost.
