@@ -6,7 +6,7 @@
 # make faults   plants faults in the GPU's kernels and says what finds each
 # make stability   asks each operator STABILITY_CASES times and writes docs/benchmarks/stability.md; more in STABILITY_OPTIONS
 # make tables   says which tables under docs/ are stale, and fails where one is too old
-# make mutants   changes MUTANTS, files of the package, place by place and says which changes no fast test sees
+# make mutants   changes MUTANTS, files or folders of the package, place by place and says which changes no fast test sees
 # make docs   builds the documentation into build/docs (HTML, to be read without a network)
 # make figures   draws the figures of docs/method.md with the operators
 # make results   trains on whole scenes for hours, and writes their pages of docs/benchmarks; PAGE names some
