@@ -1,19 +1,15 @@
 // The light's pyramid, its harmonics for as many points as a vector has lanes, beside LightLookupBody and
 // read_light_backward: 5 x forward, 6 x backward (8192 points, half of them on the harmonics; float32, one thread, AVX-512).
+#include "block_product.h"
 #include "kernel_set.h"
 
 namespace splitnerf::SPLITNERF_ISA {
 namespace {
 
-// One register of the widest set; narrower sets split it.
-template <class T> struct Lanes;
-template <> struct Lanes<float> {
-  typedef float V __attribute__((vector_size(64)));
-  static constexpr int n = 16;
-};
-template <> struct Lanes<double> {
-  typedef double V __attribute__((vector_size(64)));
-  static constexpr int n = 8;
+// One register: vectors of two spill, 4 to 6 x as long on AVX2.
+template <class T> struct Lanes {
+  typedef T V __attribute__((vector_size(kVectorBytes)));
+  static constexpr int n = kVectorBytes / sizeof(T);
 };
 
 // Points that wait for the harmonics, evaluated one lane each. `share` is how much of the harmonics'
