@@ -77,16 +77,8 @@ class Row:
 
 
 def make_rows(base: Config, names: list[str] | None = None) -> list[Row]:
-    """The full method and its variations, with the references of the variations. A variation that equals `base` is left
-    out.
-
-    Args:
-        base: The settings of the full method.
-        names: The names of the variations; None for all.
-
-    Raises:
-        InputError: A name is unknown.
-    """
+    """The full method with the settings `base`, and its variations of these names (None: all), with the references of the
+    variations. A variation that equals `base` is left out. Raises InputError where a name is unknown."""
     known = PAPER | SWITCHES
     unknown = [name for name in names or [] if name not in known]
     if unknown:

@@ -42,16 +42,9 @@ class Interrupted(Exception):
 
 
 def ablate(plan: AblationPlan, show: Callable[[list[Score]], None]) -> list[Score]:
-    """Trains and scores the runs that are not finished yet.
-
-    Args:
-        plan: The plan.
-        show: A function called after each run with all scores so far.
-
-    Raises:
-        InputError: The data or a run's folder cannot be used.
-        Interrupted: Ctrl-C ended a training; the same call continues it.
-    """
+    """Trains and scores the runs that are not finished yet, and calls `show` after each run with all scores so far. Raises
+    InputError where the data or a run's folder cannot be used, and Interrupted where Ctrl-C ended a training; the same call
+    continues it."""
     scores: list[Score] = []
 
     def run(scene: Path, row: Row, seed: int) -> None:

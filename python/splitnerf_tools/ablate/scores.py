@@ -29,17 +29,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference of a row's PSNR from its reference in one scene, over relit views or, without any, novel views.
-
-    Attributes:
-        row: The name of the row.
-        mean: The mean difference in dB over the seeds that both have; positive is better than the reference.
-        error: The standard error of the mean in dB; None with one seed.
-    """
+    """The difference of a row's PSNR from its reference in one scene, over relit views or, without any, novel views."""
 
     row: str
-    mean: float
-    error: float | None
+    mean: float  # in dB, over the seeds that both have; positive is better than the reference
+    error: float | None  # the standard error of the mean in dB; None with one seed
 
     def verdict(self) -> str:
         """The difference in words: a number, or "no difference" if it is too small."""

@@ -118,8 +118,7 @@ def _free(run: Path) -> bool:
 
 
 def become(parent: int, command: list[str]) -> None:
-    """Becomes a command that receives SIGTERM when the parent of this process ends. On systems other than Linux it runs
-    to its own end."""
+    """Becomes a command that receives SIGTERM when this process's parent ends; on systems other than Linux it runs to its end."""
     signal.pthread_sigmask(signal.SIG_SETMASK, [])  # Ray blocks Ctrl-C in its own
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)

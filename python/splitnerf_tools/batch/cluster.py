@@ -73,7 +73,7 @@ def share_of(
     photos: float | None = None,
     whole_gpu: bool = False,
 ) -> Share:
-    """The share of each of some scenes.
+    """The share of each of some scenes. Raises InputError where no machine has that much.
 
     Args:
         machines: The resources of each by Ray: "CPU", "GPU", "memory" in bytes.
@@ -81,9 +81,6 @@ def share_of(
         cores, gpus, memory: The requests of the user, memory in GB; None for the needs of a training.
         photos: GB for the photos of a scene; None for the rest of its memory.
         whole_gpu: Whether a training fills a GPU.
-
-    Raises:
-        InputError: No machine has that much.
     """
     most = {key: max((machine.get(key, 0.0) for machine in machines), default=0.0) for key in ("CPU", "GPU", "memory")}
     if cores is None:
@@ -103,17 +100,11 @@ def share_of(
 
 @contextmanager
 def ray_on(address: str | None, out: Path) -> Iterator[ModuleType]:
-    """Ray, connected to a cluster, or started on this machine and ended with the block.
+    """Ray, connected to the cluster whose head is at `address`, or (None) started on this machine and ended with the block.
 
-    Ray's output goes into a file of the batch's logs. Signals to end raise KeyboardInterrupt within the block.
-
-    Args:
-        address: The address of the cluster's head; None for this machine.
-        out: The batch's folder.
-
-    Raises:
-        InputError: Ray is not installed or cannot be loaded, no cluster answers, or the logs would replace other files.
-        RuntimeError: Ray does not start here.
+    Ray's output goes into a file of the logs in the batch's folder `out`. Signals to end raise KeyboardInterrupt within the block.
+    Raises InputError where Ray is not installed or cannot be loaded, no cluster answers, or the logs would replace other files, and
+    RuntimeError where Ray does not start here.
     """
     if find_spec("ray") is None:
         raise InputError("batch needs the package ray: pip install 'splitnerf[batch]'")

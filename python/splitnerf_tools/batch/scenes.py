@@ -71,8 +71,7 @@ class Scene:
 
 
 def scene_name(data: str, taken: Iterable[str]) -> str:
-    """A name for a scene's run: that of its folder, without what is unsafe in a file system, a shell or a terminal, and
-    with a number where it is taken. Names that differ by case only are equal."""
+    """A run's name: that of its folder without unsafe characters, with a number where it is taken; case makes no difference."""
     safe = re.sub(r"[^\w.+=@-]+", "_", os.path.basename(data), flags=re.ASCII).lstrip(".-")[:MOST_LETTERS] or "scene"
     own = {STATE, TABLE, LOGS, LOCK, "ray"}  # logs/ray.log is Ray's
     used = {name.lower() for name in (*taken, *own)}
@@ -83,11 +82,7 @@ def scene_name(data: str, taken: Iterable[str]) -> str:
 
 
 def known_scenes(out: Path) -> list[Scene]:
-    """The scenes of earlier calls.
-
-    Raises:
-        InputError: The file that stores them cannot be read.
-    """
+    """The scenes of earlier calls. Raises InputError where the file that stores them cannot be read."""
     path = out / STATE
     if not path.exists():
         return []

@@ -43,12 +43,8 @@ class BatchPlan:
 
 
 def run_batch(ray: ModuleType, batch: BatchPlan, share: Share) -> bool:
-    """Trains the scenes, each as a task of Ray's; a finished run is left alone by `train --resume auto` itself.
-
-    Returns:
-        Whether all came to an end; False where a signal to end came. All processes have ended then, each with its state
-        saved.
-    """
+    """Trains the scenes, each as a task of Ray's; a finished run is left alone by `train --resume auto` itself. Returns whether all
+    came to an end; False where a signal to end came. All processes have ended then, each with its state saved."""
     options = list(batch.options)
     if not any(option.startswith("--max-memory") for option in options):
         options.append(f"--max-memory={share.photos:g}")

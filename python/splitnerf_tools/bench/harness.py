@@ -54,12 +54,7 @@ class Times:
 
 
 def interleaved(calls: Mapping[Hashable, Callable[[], object]], rounds: int) -> Times:
-    """Runs every call once to warm up, then times all calls in turns, so that all run under the same load.
-
-    Args:
-        calls: The calls by name.
-        rounds: The number of measurements of each.
-    """
+    """Runs every call once to warm up, then times `rounds` rounds of all calls in turns, so that all run under the same load."""
     repeats = {}
     for name, call in calls.items():
         call()
@@ -98,11 +93,7 @@ def with_gradients(way: Callable[..., Tensor], inputs: tuple[Tensor, ...], cotan
 
 
 def check(subject: str, errors: Mapping[Hashable, float], limit: float) -> None:
-    """Checks a method's errors before it is timed.
-
-    Raises:
-        CheckFailed: An error is not below the limit.
-    """
+    """Checks a method's errors before it is timed. Raises CheckFailed where an error is not below the limit."""
     for name, error in errors.items():
         if not error < limit:
             way = name if isinstance(name, str) else " ".join(name)
@@ -133,17 +124,13 @@ def chart_of(
 
 
 def run_benchmarks(modules: Sequence[str], quick: bool, out: Path, show: Callable[[str], None]) -> list[Path]:
-    """Checks and times the operators, writes the charts, and shows the findings as they come.
+    """Checks and times the operators, writes the charts, and shows the findings as they come. Raises CheckFailed where an
+    operator's results are wrong, and InputError where matplotlib is missing or the folder cannot take the results.
 
     Args:
         modules: The names of modules, each with ``run(quick, rounds)``.
         quick: Whether to use small inputs and few rounds, which takes minutes in all.
         out: The folder of the results; created if missing. Only earlier results are replaced there.
-        show: A function called with each line.
-
-    Raises:
-        CheckFailed: An operator's results are wrong.
-        InputError: matplotlib is missing, or the folder cannot take the results.
     """
     if find_spec("matplotlib") is None:
         raise InputError("the charts need matplotlib: pip install 'splitnerf[bench]'")

@@ -33,8 +33,7 @@ LARGE = 500  # columns and rows of the mesh of 500k triangles
 
 
 class SurfacePoints:
-    """Points on a mesh's faces with interpolated normals, mirror directions of random views, and the light above
-    them."""
+    """Points on a mesh's faces with interpolated normals, mirror directions of random views, and the light above them."""
 
     def __init__(self, mesh: trimesh.Trimesh, n: int, environment: np.ndarray):
         self.vertices = torch.from_numpy(mesh.vertices.astype(np.float32))
@@ -69,15 +68,8 @@ class SurfacePoints:
 
 
 def run(quick: bool, rounds: int) -> Result:
-    """Error of the factors against time, then rays a second, on one mesh of 100k and one of 500k triangles.
-
-    Args:
-        quick: Whether to use one light and fewer points, with Open3D as the only other tracer.
-        rounds: The number of timing rounds.
-
-    Raises:
-        CheckFailed: The tracers disagree.
-    """
+    """Error of the factors against time, then rays a second, on one mesh of 100k and one of 500k triangles; `quick`: with one
+    light, fewer points, and Open3D as the only other tracer. Raises CheckFailed where the tracers disagree."""
     torch.manual_seed(0)
     mesh = armadillo()
     environments = lights()

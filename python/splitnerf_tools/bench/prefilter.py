@@ -32,14 +32,7 @@ Estimate = Callable[[Tensor, Tensor], Tensor]
 
 
 class Truth:
-    """gbar of a light, from a quadrature over the sphere or, where its nodes would miss the lobe, from many samples of
-    it.
-
-    Args:
-        light: The light.
-        height: The number of rows of the quadrature; it has twice as many columns.
-        n: The number of samples of a lobe.
-    """
+    """gbar of a light: a quadrature over `height` x 2 `height` nodes or, where these would miss the lobe, n samples of the lobe."""
 
     def __init__(self, light: MapLight, height: int, n: int):
         self.light, self.n = light, n
@@ -98,8 +91,7 @@ def filtered_importance(light: MapLight, n: int) -> Estimate:
 
 
 def lobe_integral(roughness: Tensor) -> Tensor:
-    """Integral of D (w.axis)+ over the sphere, D of the angle's half: 2 a^2 / B^2 (y - ln(1 + y)), y = B / a^2,
-    B = (1 - a^2) / 2; 1 where a = 1."""
+    """Integral of D (w.axis)+ over the sphere, D of half the angle: 2 a^2 / B^2 (y - ln(1 + y)), y = B / a^2, B = (1 - a^2) / 2."""
     a2 = roughness.double() ** 4
     b = (1 - a2) / 2
     y = b / a2
@@ -140,12 +132,7 @@ def estimators(light: MapLight, quick: bool) -> dict[tuple[str, str], Estimate]:
 
 
 def run(quick: bool, rounds: int) -> Result:
-    """Error against time for batches of queries of one roughness, light by light.
-
-    Args:
-        quick: Whether to use few bands, one light and a coarser truth.
-        rounds: The number of timing rounds.
-    """
+    """Error against time for queries of one roughness, light by light; `quick`: few bands, one light and a coarser truth."""
     torch.manual_seed(0)
     shipped = preset("cpu")
     n_queries, height, n_truth = (256, 512, 1 << 14) if quick else (512, 1024, 1 << 16)
@@ -171,8 +158,7 @@ def run(quick: bool, rounds: int) -> Result:
 
 
 def defaults(config: Config, rho: float) -> list[tuple[str, str]]:
-    """The library's defaults at a roughness: the pyramid, and the consistency loss's estimate for `light.kind =
-    mlp`."""
+    """The library's defaults at a roughness: the pyramid, and the consistency loss's estimate for `light.kind = mlp`."""
     narrow = ("own lobe", f"n = {config.constants.light_lobe_samples}")
     wide = ("Fibonacci", f"n = {config.constants.light_samples}")
     resolution = f"{config.light.resolution} x {config.light.resolution}"
@@ -186,8 +172,7 @@ def relative_rms(estimates: list[Tensor], true: Tensor) -> float:
 
 
 def finding(chart: Chart) -> str:
-    """A comparison of the defaults with the best method not slower than the pyramid and with the published
-    estimator."""
+    """A comparison of the defaults with the best method not slower than the pyramid and with the published estimator."""
     mlp, own = sorted((p for p in chart.points if p.default), key=lambda p: p.series == "pyramid")
     rivals = [p for p in chart.points if not p.default and p.series != own.series and p.cost <= own.high]
     best = min(rivals, key=lambda p: p.error, default=None)

@@ -40,8 +40,7 @@ def lights() -> dict[str, np.ndarray]:
 
 
 class MapLight:
-    """Radiance of an equirectangular map from any direction: bilinear, with the map's means beneath for a filtered
-    lookup."""
+    """Radiance of an equirectangular map from any direction: bilinear, with the map's means beneath for a filtered lookup."""
 
     def __init__(self, radiance: np.ndarray):
         self.levels = [torch.from_numpy(np.ascontiguousarray(radiance))]
@@ -63,8 +62,7 @@ class MapLight:
         return F.grid_sample(image, grid, padding_mode="border", align_corners=False)[0, :, 0].T
 
     def filtered(self, directions: Tensor, solid_angles: Tensor) -> Tensor:
-        """Radiance [n, 3] averaged over about these solid angles [n] (sr), by linear interpolation of two mip
-        levels."""
+        """Radiance [n, 3] averaged over about these solid angles [n] (sr), by linear interpolation of two mip levels."""
         texel = 4 * math.pi / self.levels[0][..., 0].numel()
         lod = (0.5 * torch.log2(solid_angles / texel)).clamp(0, len(self.levels) - 1.001)
         below, share = lod.floor().long(), lod.frac()[:, None]
@@ -77,10 +75,7 @@ class MapLight:
 
 
 def octahedral_directions(n: int) -> np.ndarray:
-    """[n^2, 3] unit directions of an octahedral map's texel centres, row by row.
-
-    Source: Praun and Hoppe 2003.
-    """
+    """[n^2, 3] unit directions of an octahedral map's texel centres, row by row (Praun and Hoppe 2003)."""
     centre = (2 * np.arange(n) + 1) / n - 1
     v, u = np.meshgrid(centre, centre, indexing="ij")
     z = 1 - np.abs(u) - np.abs(v)

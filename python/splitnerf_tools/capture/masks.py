@@ -35,18 +35,8 @@ def find_masks(
 ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """The masks [h, w] in [0, 1] of the photos of `out/transforms.json`, in their order, at a size of their own, and what is behind
     the object, see :func:`splitnerf_tools.separation.masks.with_background`; None on a turntable, where it moves. Writes the plane
-    of the table to `out`, before the first mask.
-
-    Args:
-        out: The folder of the undistorted photos.
-        world: The cameras' world.
-        seed: The seed of the field.
-        turntable: Whether the object turned.
-        report: Called with the share done.
-
-    Raises:
-        InputError: Nothing stands in the middle of the photos.
-    """
+    of the table to `out`, before the first mask, and calls `report` with the share done. Raises InputError where nothing stands in
+    the middle of the photos."""
     photos = load_dataset(out, "train", 1, Reading("all"), masked=False)
     to_box = photos.box_from_world
     field = train_field(photos, steps=STEPS, minutes=0.0, seed=seed, report=lambda share, _: report(0.8 * share))
@@ -62,12 +52,9 @@ def find_masks(
 
 
 def mask_files(photos: Sequence[Photograph], folder: Path) -> dict[str, Path]:
-    """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it.
-
-    Raises:
-        InputError: A photo has no mask, one of another size, one that may be another's, too, one that is no mask, or a faint
-            one, or all are black.
-    """
+    """The mask of each photo by the photo's name: a file with the photo's own name, without its extension or with it. Raises
+    InputError where a photo has no mask, one of another size, one that may be another's, too, one that is no mask, or a faint one,
+    or where all are black."""
     found, stems = {}, {}
     for path in sorted(folder.iterdir()):
         if path.is_file() and not path.name.startswith("._"):

@@ -20,15 +20,12 @@ REACH = 1.25 * CAMERA_DISTANCE  # half of a plan's edge, in the world's units
 def write_page(
     out: Path, world: World, gains: np.ndarray, mask_share: np.ndarray, left_out: dict[str, str], title: str
 ) -> None:
-    """Writes `prepare.html`, without outside references, from the images and masks beside it.
+    """Writes `prepare.html` to `out`, without outside references, from the folders `images` and `masks` beside it.
 
     Args:
-        out: The folder with `images` and `masks`.
-        world: Cameras and points.
         gains: [n] the photos' relative exposures.
         mask_share: [n] the share of each image that its mask covers.
         left_out: Why photos were left out, by name.
-        title: The heading.
     """
     scene = world.scene
     tiles = [

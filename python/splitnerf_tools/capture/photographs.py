@@ -55,11 +55,8 @@ class Photograph:
 
 
 def find_photographs(folder: Path) -> list[Photograph]:
-    """The photos of a folder in the order of their names; files of the same content are taken once.
-
-    Raises:
-        InputError: The folder has no photo, or one cannot be read.
-    """
+    """The photos of a folder in the order of their names; files of the same content are taken once. Raises InputError where the
+    folder has no photo, or one cannot be read."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; give the folder with the photos")
     paths = sorted(
@@ -88,11 +85,8 @@ def find_photographs(folder: Path) -> list[Photograph]:
 
 
 def read_upright(path: Path) -> np.ndarray:
-    """[H, W, 3] uint8 (uint16 of a raw photo) sRGB, turned as the file says.
-
-    Raises:
-        InputError: The file is no photo, or the package that reads it is missing.
-    """
+    """[H, W, 3] uint8 (uint16 of a raw photo) sRGB, turned as the file says. Raises InputError where the file is no photo, or the
+    package that reads it is missing."""
     if path.suffix.lower() in RAW:
         try:
             import rawpy
@@ -134,17 +128,8 @@ def sharpness(photo: np.ndarray) -> float:
 
 
 def write_frames(video: Path, folder: Path, n: int, report: Callable[[float], None]) -> None:
-    """Cuts a video into n windows of equal length and writes the sharpest frame of each as `frame_NNNNN.png`.
-
-    Args:
-        video: The file.
-        folder: The folder for the frames, which is there.
-        n: The number of frames, at least 1.
-        report: Called with the share done.
-
-    Raises:
-        InputError: The file is no video that can be read.
-    """
+    """Cuts a video into n windows of equal length, n >= 1, and writes the sharpest frame of each as `frame_NNNNN.png` into a folder
+    that is there; calls `report` with the share done. Raises InputError where the file is no video that can be read."""
     reader = cv2.VideoCapture(str(video))
     total = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
     if not reader.isOpened() or total < 1:

@@ -125,20 +125,15 @@ def reconstruct(
     report: Callable[[str, float], None],
     moving: Path | None = None,
 ) -> Reconstruction:
-    """Finds cameras and sparse points.
+    """Finds cameras and sparse points. Raises InputError where fewer than three photos fit together.
 
     Args:
-        photos: The photos.
         images: A folder with the photos, upright, as `GROUP/NAME.png` or `.jpg`, see :func:`file_name`; the photos of a
             group share a lens.
         folder: A working folder; what is found there of an earlier, interrupted call is used.
-        seed: The seed of all random choices.
         report: Called with the step's name and the share done.
         moving: A folder with a mask `GROUP/FILE.png` of each photo, outside of which no features are taken; None: they are
             taken everywhere.
-
-    Raises:
-        InputError: Fewer than three photos fit together.
     """
     database = folder / "colmap.db"
     if database.exists() and not _is_sound(database):
@@ -212,11 +207,8 @@ def _best_model(
     options: pycolmap.IncrementalPipelineOptions,
     report: Callable[[float], None],
 ) -> pycolmap.Reconstruction | None:
-    """The largest model with the lenses of a database, adjusted. Where its cameras are doubtful, also one with pixels that need
-    not be square, one with a lens for each photo, and then with a lens for those of about one focal length, until the focal
-    lengths that their points show agree with it: photos may be squeezed, zoomed or cut without a word in their files. The
-    model that explains most is taken; further lenses must be worth it.
-    """
+    """The largest model, adjusted. Where its cameras are doubtful, models with pixels that need not be square, with a lens a photo,
+    and with a lens a focal length compete with it: photos may be squeezed, zoomed or cut without a word in their files."""
     with closing(pycolmap.Database.open(database)) as base:
         n = base.num_images()
 
@@ -248,8 +240,7 @@ def _best_model(
 
 
 def _with_lenses(database: Path, target: Path, model: str, lens_of: dict[int, int], focal: dict[int, float]) -> Path:
-    """A copy of a database with a camera for the photos of one size and one lens by `lens_of`, with focal lengths to begin
-    with. Photos go by COLMAP's numbers."""
+    """A copy of a database with a camera per size and lens; `lens_of` and the first focal lengths go by COLMAP's photo numbers."""
     shutil.copy(database, target)
     with closing(pycolmap.Database.open(target)) as base:
         before, made = {camera.camera_id: camera for camera in base.read_all_cameras()}, {}
@@ -321,13 +312,8 @@ def _is_in_range(camera: pycolmap.Camera) -> bool:
 
 
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
-    """The model with everything refined at once: the principal points too, which the mapping holds at the photos' centres, and
-    all of OPENCV's lens where enough photos have it. Photos that show too few of the points, or have a lens of
-    their own that is none, lose their cameras.
-
-    Points that are no points, such as highlights and mirrored lamps, fit nearly: a loss with heavy tails (Cauchy's) keeps
-    them from pulling at the cameras. Where few photos leave the principal points open, they stay at the centres.
-    """
+    """The model refined at once, with principal points and all of OPENCV's lens where enough photos tell them; weak cameras go.
+    Cauchy's loss keeps points that are no points, such as highlights and mirrored lamps, from pulling at the cameras."""
     shortest = SHORTEST if model.num_reg_images() > FEW else 2
     photos_of = Counter(image.camera_id for image in map(model.image, model.reg_image_ids()))
     often = [key for key, n in photos_of.items() if n >= MIN_PHOTOS]

@@ -65,13 +65,8 @@ def prepare(
     source: Path, out: Path, settings: PrepareSettings, report: Callable[[str, float], None]
 ) -> tuple[Reconstruction, dict[str, str]]:
     """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr` and `prepare.html`; returns the cameras and points, and why
-    photos were left out, by name.
-
-    What an interrupted call with the same photos has done in `out/work` is used again.
-
-    Raises:
-        InputError: The photos cannot be read or do not fit together, or the folder holds other files.
-    """
+    photos were left out, by name. What an interrupted call with the same photos has done in `out/work` is used again. Raises
+    InputError where the photos cannot be read or do not fit together, or the folder holds other files."""
     work = out / "work"
     others = out.is_dir() and {path.name for path in out.iterdir()} - {LOCK}
     if others and not (is_own(work) or is_own(out / "frames")):
@@ -110,8 +105,7 @@ def _photographs(
 
 
 def fingerprint(files: Sequence[Path], *settings: object) -> str:
-    """A hash of settings and of files by their paths, sizes and times. Raises InputError where a file cannot be
-    read."""
+    """A hash of settings and of files by their paths, sizes and times. Raises InputError where a file cannot be read."""
     try:
         stats = [(str(path.resolve()), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
     except OSError as error:
@@ -207,8 +201,7 @@ def write_data(
     settings: PrepareSettings,
     report: Callable[[str, float], None],
 ) -> np.ndarray:
-    """Writes `images/`, `masks/`, `transforms.json`, `surroundings.exr`, and with found masks `behind/` and `ground.json`; returns the
-    share that each mask covers."""
+    """Writes what `prepare` names but the page, and of found masks `behind/` and `ground.json`; returns [n] each mask's share."""
     scene, pinholes = world.scene, [pinhole_of(lens, settings.max_size) for lens in world.scene.lenses]
     for folder in ("images", "masks"):
         (out / folder).mkdir(exist_ok=True)

@@ -50,7 +50,6 @@ def surroundings(shots: Iterable[Shot], centre: np.ndarray, table_radius: float)
     Directions below the horizon that no photo shows lie mostly under the object; they get the median of the others there.
 
     Args:
-        shots: The photos.
         centre: [3] the middle of the object.
         table_radius: The radius of the table z = 0 around the origin; 0 where there is none.
     """

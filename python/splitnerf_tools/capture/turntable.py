@@ -22,12 +22,7 @@ GROWN = 2  # pixels by which what moves is made wider, for features at its outli
 
 
 def moving_pixels(photos: Sequence[np.ndarray], of: Sequence[object] | None = None) -> list[np.ndarray]:
-    """[h, w] bool of each photo: what does not look as it does in many others of its size.
-
-    Args:
-        photos: [h, w, 3] int16 values of 8 bits, of any sizes.
-        of: The lens of each photo; only photos of one lens are compared. None: all.
-    """
+    """[h, w] bool of each photo [h, w, 3] int16 of 8 bits: what is unlike many others of its size and lens `of[i]` (None: any)."""
     kinds = [(photo.shape, of and of[i]) for i, photo in enumerate(photos)]
     result = []
     for i, photo in enumerate(photos):
@@ -50,11 +45,8 @@ def reduced(photo: np.ndarray) -> np.ndarray:
 
 
 def write_moving(images: Path, folder: Path, report: Callable[[float], None]) -> None:
-    """For each photo `images/GROUP/FILE` a mask `folder/GROUP/FILE.png`, white where something moves, as COLMAP reads it.
-
-    Raises:
-        InputError: Nothing moves.
-    """
+    """For each photo `images/GROUP/FILE` a mask `folder/GROUP/FILE.png`, white where something moves, as COLMAP reads it. Raises
+    InputError where nothing moves."""
     paths = sorted(path for path in images.rglob("*") if path.is_file())
     photos, sizes = [], []
     for i, path in enumerate(paths):
@@ -74,12 +66,8 @@ def write_moving(images: Path, folder: Path, report: Callable[[float], None]) ->
 
 
 def light_turns(poses: np.ndarray) -> np.ndarray:
-    """[n, 3, 3] rotations from directions of a world whose z axis is the turntable's, to those in which the light stands
-    still: that of a camera which goes up and down alone.
-
-    Args:
-        poses: [n, 4, 4] camera-to-world, OpenGL axes.
-    """
+    """[n, 3, 3] rotations from directions of a world whose z axis is the turntable's, to those in which the light stands still:
+    that of a camera which goes up and down alone. `poses` are [n, 4, 4] camera-to-world, OpenGL axes."""
     up, back = poses[:, :3, 1], poses[:, :3, 2]
     # Where the camera stands, as seen from the axis: of unit length whatever its height, if its x axis is level.
     towards = back * up[:, 2:] - up * back[:, 2:]

@@ -16,7 +16,6 @@ def pinhole_of(lens: Lens, max_size: int) -> Lens:
     """The pinhole camera, without distortion, whose image a lens's photo covers wholly.
 
     Args:
-        lens: The lens of the photo.
         max_size: The longest edge in pixels; 0 keeps the photo's.
     """
     size = (lens.width, lens.height)
@@ -31,7 +30,6 @@ def without_vignetting(photo: np.ndarray, lens: Lens, vignetting: tuple[float, f
 
     Args:
         photo: uint8 or uint16, sRGB.
-        lens: The lens of the photo.
         vignetting: (a, b) of the factor 1 + a r^2 + b r^4 of linear values, r in half diagonals from the principal point.
     """
     y, x = np.mgrid[: lens.height, : lens.width] + 0.5

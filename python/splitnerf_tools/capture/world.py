@@ -42,14 +42,10 @@ class World:
 
 
 def settle(found: Reconstruction, seed: int) -> World:
-    """Turns, moves and scales a reconstruction, and tells the object's points from the others.
+    """Turns, moves and scales a reconstruction in any frame, and tells the object's points from the others.
 
     The centre is where the cameras' axes meet. Up is the normal of the plane on which most points near it lie, below it
     (the table), or the mean of the cameras' upward axes where there is none.
-
-    Args:
-        found: The reconstruction, in any frame.
-        seed: The seed of the search for the table.
     """
     centre, up = meeting_point(found.poses), found.poses[:, :3, 1].mean(0)
     up = up / np.linalg.norm(up)
@@ -90,14 +86,7 @@ def meeting_point(poses: np.ndarray) -> np.ndarray:
 
 
 def object_points(points: np.ndarray, centre: np.ndarray, table: bool) -> np.ndarray:
-    """[m] bool, the points around the centre, above the table where there is one: the largest group of points that hang
-    together, and others above or below it.
-
-    Args:
-        points: [m, 3] in the world's units.
-        centre: [3] the centre of the object.
-        table: Whether z = 0 is a table.
-    """
+    """[m] bool, points [m, 3] near the centre [3], above a table z = 0: the largest connected group, others over or under it."""
     chosen = np.linalg.norm(points - centre, axis=1) < 0.5 * CAMERA_DISTANCE
     if table:
         chosen &= points[:, 2] > 1.5 * TABLE_TOLERANCE * CAMERA_DISTANCE

@@ -24,23 +24,14 @@ PLINTH_TOP = -0.24
 
 @dataclass(frozen=True)
 class DemoScene:
-    """One triangle mesh with a material at each vertex.
+    """One triangle mesh with a material at each vertex."""
 
-    Attributes:
-        vertices: [n, 3] float32, z up, inside the unit sphere.
-        triangles: [m, 3] int32, counter-clockwise seen from outside.
-        normals: [n, 3] float32 unit shading normals.
-        albedo: [n, 3] float32 linear, in [0, 1].
-        roughness: [n] float32 perceptual, in [0, 1].
-        metallic: [n] float32, 0 or 1.
-    """
-
-    vertices: np.ndarray
-    triangles: np.ndarray
-    normals: np.ndarray
-    albedo: np.ndarray
-    roughness: np.ndarray
-    metallic: np.ndarray
+    vertices: np.ndarray  # [n, 3] float32, z up, inside the unit sphere
+    triangles: np.ndarray  # [m, 3] int32, counter-clockwise seen from outside
+    normals: np.ndarray  # [n, 3] float32 unit shading normals
+    albedo: np.ndarray  # [n, 3] float32 linear, in [0, 1]
+    roughness: np.ndarray  # [n] float32 perceptual, in [0, 1]
+    metallic: np.ndarray  # [n] float32, 0 or 1
 
 
 def build_scene() -> DemoScene:
@@ -82,11 +73,7 @@ def build_scene() -> DemoScene:
 
 
 def build_environment(height: int = 128) -> np.ndarray:
-    """Builds the light: a blue sky, a softened sun, warm ground and two soft boxes.
-
-    Returns:
-        [height, 2 height, 3] float32 linear radiance, equirectangular (the centre column looks along +x).
-    """
+    """[height, 2 height, 3] float32 linear radiance, equirectangular, +x in the middle: sky, sun, warm ground, two soft boxes."""
     d, _ = directions_of_texels(height)
     up = d[..., 2:]
 
@@ -105,23 +92,15 @@ def build_environment(height: int = 128) -> np.ndarray:
 def write_demo_dataset(
     out: Path, *, size: int = 100, n_train: int = 60, n_test: int = 8, spp: int = 64, seed: int = 0
 ) -> Path:
-    """Renders the demo scene and writes it as a dataset with truth.
+    """Renders the demo scene and writes it as a dataset with truth; returns `out`. Raises OSError where a file cannot be written.
 
     The folder is in the layout "blender" of :mod:`splitnerf_tools.synth.writer`, without relit views.
 
     Args:
         out: The folder to write to; made where it is missing.
         size: Width and height of the images in pixels.
-        n_train: Number of training views.
-        n_test: Number of test views.
         spp: Paths a pixel.
         seed: Seed of the renderings; the same seed writes the same data.
-
-    Returns:
-        `out` as a Path.
-
-    Raises:
-        OSError: A file cannot be written.
     """
     from splitnerf import _core
 

@@ -29,19 +29,12 @@ READ_ON_THE_CPU = {"resolutions", "nodes"}  # arguments
 
 
 class Failure(NamedTuple):
-    """An operator that does not give what is known.
+    """An operator that does not give what is known."""
 
-    Attributes:
-        operator: Its name in ``torch.ops.splitnerf``.
-        device: The device that it ran on.
-        said: What was found and what was expected, or the error that it raised.
-        known: What these are.
-    """
-
-    operator: str
-    device: str
-    said: str
-    known: str
+    operator: str  # its name in ``torch.ops.splitnerf``
+    device: str  # on which it ran
+    said: str  # what was found and what was expected, or the error that it raised
+    known: str  # what these are
 
 
 def operators(device: str) -> list[str]:
@@ -114,8 +107,7 @@ def weights(x: Tensor) -> Tensor:
 
 
 def sums(x: Tensor) -> list[float]:
-    """The sums of the numbers and of their absolute values, both weighted. Of whole numbers the remainder counts, in which
-    a change of the last bit is not small."""
+    """Weighted sums of numbers and their absolute values; of whole numbers the remainder, where a change of the last bit shows."""
     numbers = (x.detach() if x.is_floating_point() else x.long() % MODULUS).double()
     return [float((y * weights(x)).sum()) for y in (numbers, numbers.abs())]
 

@@ -48,16 +48,7 @@ class Inspection:
 
 
 def inspect(train: Dataset, test: Dataset | None, reading: Reading) -> Inspection:
-    """Looks at a data set.
-
-    Args:
-        train: The photos to train on.
-        test: Those that are held out, or None.
-        reading: How they were read.
-
-    Raises:
-        InputError: The masks and poses leave no hull.
-    """
+    """Looks at a data set, with or without photos held out. Raises InputError where the masks and poses leave no hull."""
     views = views_of(train) + ([] if test is None else views_of(test))
     fit = fit_masks(views)
     if fit is None:
@@ -235,12 +226,7 @@ def angles(views: Sequence[ReducedView], centre: np.ndarray) -> tuple[np.ndarray
 
 
 def find_upward(poses: np.ndarray) -> np.ndarray:
-    """[3] the unit vector to which the cameras' sideways axes are perpendicular, on the side of their upward axes; z
-    where they have no such vector or it is nearly z.
-
-    Args:
-        poses: [n, 4, 4] camera-to-world, OpenGL axes.
-    """
+    """[3] the upward unit vector perpendicular to the x axes of OpenGL poses [n, 4, 4]; z where it is nearly z or there is none."""
     z = np.array([0.0, 0.0, 1.0])
     sideways = poses[:, :3, 0]
     if (sideways @ z).std() == 0 and np.abs(sideways @ z).max() < 1e-6:
@@ -279,12 +265,7 @@ DARKEST = 1e-3  # of the linear values that count
 
 
 def duplicates(views: Sequence[ReducedView], radius: float) -> list[tuple[int, int, str]]:
-    """Pairs of photos, i < j, of which at most one can be right, and what they are: one file, or one pose.
-
-    Args:
-        views: The photos.
-        radius: The object's radius.
-    """
+    """Pairs of photos, i < j, of which at most one can be right, and what they are: one file, or one pose."""
     poses = np.stack([view.pose for view in views])
     apart = np.linalg.norm(poses[:, None, :3, 3] - poses[None, :, :3, 3], axis=-1) / radius
     turn = (np.einsum("iab,jab->ij", poses[:, :3, :3], poses[:, :3, :3]) - 1) / 2
@@ -297,11 +278,7 @@ def duplicates(views: Sequence[ReducedView], radius: float) -> list[tuple[int, i
 
 
 def differences(views: Sequence[ReducedView], fit: Fit) -> np.ndarray:
-    """[n] by how many powers of two each photo is brighter than its neighbours in direction, NaN where it has none.
-
-    Two photos are compared where both show a cell of the hull's surface, by the median of the ratios there; a photo's
-    difference is the median over its neighbours.
-    """
+    """[n] by how many powers of two each photo is brighter than its neighbours in direction (medians); NaN where it has none."""
     surface = _surface(fit)
     values = np.stack([_seen_values(view, surface, fit.cell) for view in views])
     directions = np.stack([view.place - fit.centre for view in views])

@@ -19,11 +19,7 @@ MASK_COLOUR, HULL_COLOUR = (0.95, 0.45, 0.05), (0.15, 0.65, 1.0)
 
 
 def write_page(path: Path, found: Inspection) -> None:
-    """Writes a page without outside references.
-
-    Raises:
-        OSError: The page cannot be written.
-    """
+    """Writes a page without outside references. Raises OSError where the page cannot be written."""
     suspects: dict[int, list[str]] = {}
     for finding in found.findings:
         for index, reason in finding.suspects.items():

@@ -21,17 +21,13 @@ Series = Sequence[tuple[float, float]]
 
 
 def line_chart(title: str, series: Mapping[str, Series], *, log: bool = False, across: str = "step") -> Markup:
-    """Draws lines, by default over training steps.
+    """Draws lines, by default over training steps: a `<figure>` with an SVG and a legend; empty where no point is left.
 
     Args:
-        title: Heading of the chart.
         series: Points (x, value) by name, x >= 0; points that are not finite, or not positive where `log`,
             are left out.
         log: Whether the vertical axis is logarithmic.
         across: What x is.
-
-    Returns:
-        A `<figure>` with an SVG and a legend; empty where no point is left.
     """
     data = curve_data(title, series, log=log) or {"x": [], "series": []}
     lines = {

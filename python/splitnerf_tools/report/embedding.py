@@ -28,17 +28,8 @@ BRIGHTEST_HALF = float(np.finfo(np.float16).max)
 
 
 def write_html(path: str | os.PathLike, package: str, template: str, **values: object) -> None:
-    """Fills a template and writes the page, atomically.
-
-    Args:
-        path: The file to write.
-        package: The package that holds the template; it may include those of :mod:`splitnerf_tools.report`.
-        template: The template's file.
-        values: What the template names.
-
-    Raises:
-        OSError: The page cannot be written.
-    """
+    """Fills a template with `values` and writes the page, atomically; the `package` that holds the template may include those of
+    :mod:`splitnerf_tools.report`. Raises OSError where the page cannot be written."""
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(name, ".") for name in (package, "splitnerf_tools.report")])
     environment = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -49,8 +40,7 @@ def write_html(path: str | os.PathLike, package: str, template: str, **values: o
 
 
 def script_json(content: object) -> Markup:
-    """JSON that is safe in an element of a page: no text in it ends the element, and numbers that are not finite are
-    null."""
+    """JSON that is safe in an element of a page: no text in it ends the element, and numbers that are not finite are null."""
     return htmlsafe_json_dumps(_finite(content), dumps=partial(json.dumps, allow_nan=False, separators=(",", ":")))
 
 
@@ -90,8 +80,7 @@ def _finite(content: object) -> object:
 
 
 def data_uri(pixels: np.ndarray) -> Markup:
-    """Encodes an image [H, W, 1 | 3 | 4] as a data URI: PNG, or lossless WebP above 200 x 200 pixels, a third of its
-    size."""
+    """Encodes an image [H, W, 1 | 3 | 4] as a data URI: PNG, or lossless WebP above 200 x 200 pixels, a third of its size."""
     if pixels.shape[0] * pixels.shape[1] <= SMALL or not features.check("webp"):
         return _uri("png", encode_image(pixels, ".png"))
     codes, file = to_uint8(pixels), io.BytesIO()

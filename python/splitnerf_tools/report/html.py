@@ -40,10 +40,10 @@ def write_report(
     grades: Sequence[Mapping] = (),
     relit: Sequence[tuple[str, np.ndarray]] = (),
 ) -> None:
-    """Writes a self-contained HTML page, atomically: pictures and tables, and a script that makes them answer.
+    """Writes a self-contained HTML page, atomically: pictures and tables, and a script that makes them answer. Raises OSError where
+    the page cannot be written.
 
     Args:
-        path: The file to write.
         title: Heading, for example the scene's name.
         summary: Folded tables by name, each row name -> value; nested mappings become dotted rows.
         views: Per test view `name`, `truth` and `prediction`; both map names of float arrays, each optional: `rgb`
@@ -61,9 +61,6 @@ def write_report(
         albedo_scale: [3] the factor of the albedo under which it is scored, see `evaluation.json`; None for 1.
         grades: Scores in words, see :func:`splitnerf.evaluate.score_table.graded`.
         relit: The asset under other lights: their names, and pictures [h, w, 3], sRGB in [0, 1].
-
-    Raises:
-        OSError: The page cannot be written.
     """
     tables = [{"name": name, "rows": _rows(table)} for name, table in summary.items()]
     total = sum(timings.values())

@@ -68,8 +68,7 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
 
 
 def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: list[int], scores: dict) -> dict | None:
-    """The report's data on the refinement, see :func:`splitnerf_tools.report.write_report`; None where a file
-    that it shows is gone."""
+    """The report's data on the refinement, see :func:`splitnerf_tools.report.write_report`; None where a file of it is gone."""
     source = run / TRAINED
     if not all((folder / name).is_file() for folder in (source, run) for name in ASSET_FILES[:2]):
         return None
@@ -87,9 +86,8 @@ def refinement_page(run: Path, views: Dataset, predictions: list[dict], shown: l
 
 
 def relit_pictures(asset: Asset, photo: int) -> list[tuple[str, np.ndarray]]:
-    """The asset path traced on a grey ground under lights that the program makes: name and [side, side, 3] sRGB.
-
-    Photos of ``photo`` pixels carry no more than pictures of twice as many."""
+    """The asset path traced on a grey ground under lights that the program makes: name and [side, side, 3] sRGB. Photos of `photo`
+    pixels carry no more than pictures of twice as many."""
     side = min(RELIT_SIDE, 2 * photo)
     renderer, view, pictures = AssetRenderer(asset), turntable(asset, 1, size=(side, None))[0], []
     for name in RELIT:

@@ -53,11 +53,7 @@ ROWS = 128  # of a light within the page
 
 def asset_section(path: Path | None) -> dict | None:
     """The 3D view of a GLB: `packed`, its bytes; `camera`; `note`, what was changed or why nothing is shown; `facts`; `textures`;
-    and `files` beside the page.
-
-    Args:
-        path: The GLB; None, and a file that is not there, make no section.
-    """
+    and `files` beside the page. None where `path` is None or no file is there."""
     if path is None or not path.is_file():
         return None
     try:
@@ -110,12 +106,8 @@ def textures_of(asset: Asset) -> list[dict]:
 
 
 def fitted(path: Path, most_bytes: int) -> tuple[bytes | None, str]:
-    """The bytes of a GLB, at most so many, and a line about what was changed: textures whose longer side has more
-    pixels than 2048, 1024, 512 or 256 are averaged down, as far as is needed. None where even the last does not help.
-
-    Raises:
-        InputError: It is no GLB.
-    """
+    """The bytes of a GLB, its textures averaged down as far as `most_bytes` needs (None: even 256 pixels a side are too many), and
+    a line about what was changed. Raises InputError where it is no GLB."""
     size = path.stat().st_size
     if size <= most_bytes:
         return path.read_bytes(), ""
@@ -128,11 +120,7 @@ def fitted(path: Path, most_bytes: int) -> tuple[bytes | None, str]:
 
 
 def with_smaller_textures(document: Document, side: int) -> bytes:
-    """The bytes of a GLB whose textures have at most `side` pixels a side; averages are of the stored values.
-
-    Raises:
-        InputError: A part is damaged.
-    """
+    """The bytes of a GLB, textures averaged to at most `side` pixels a side. Raises InputError where a part is damaged."""
     tree = copy.deepcopy(document.json)
     images = {image["bufferView"]: image for image in tree.get("images", []) if "bufferView" in image}
     binary = bytearray()
@@ -150,8 +138,7 @@ def with_smaller_textures(document: Document, side: int) -> bytes:
 
 
 def smaller_image(content: bytes, side: int) -> bytes | None:
-    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks; None where it is so
-    already."""
+    """An encoded image as a PNG of at most `side` pixels a side, by averages of whole blocks; None where it is so already."""
     with Image.open(io.BytesIO(content)) as image:
         factor = math.ceil(max(image.size) / side)
         if factor == 1:
@@ -167,12 +154,8 @@ def comparison(left: str, right: str, kind: str) -> dict:
 
 
 def views_section(views: Sequence[Mapping], albedo_scale: Sequence[float] | None) -> dict:
-    """The contents of the section for the template.
-
-    Args:
-        views: See :func:`splitnerf_tools.report.write_report`.
-        albedo_scale: The factor [3] of the predicted albedo under which it is scored, and shown here; None for 1.
-    """
+    """The template's contents for the views of :func:`splitnerf_tools.report.write_report`; `albedo_scale` is the factor [3] of the
+    predicted albedo under which it is scored, and shown here; None for 1."""
     maps = [
         key
         for key in MAPS
@@ -231,8 +214,7 @@ def _map_picture(maps: Mapping, key: str) -> Markup:
 
 
 def averaged(values: np.ndarray, alpha: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """A map [H, W, C] and its coverage [H, W], None for 1, averaged down by the least whole factor after which no side has more
-    than 512 pixels; values count by their coverage."""
+    """A map [H, W, C] and its coverage [H, W] (None: 1), averaged down, by coverage, to at most 512 pixels a side."""
     alpha = np.ones(values.shape[:2], np.float32) if alpha is None else alpha
     factor = math.ceil(max(values.shape[:2]) / MOST_PIXELS)
     factor = min(factor, *values.shape[:2])

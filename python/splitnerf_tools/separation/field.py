@@ -25,29 +25,18 @@ BLUR = 0.01  # weight that every interval of the first search keeps
 
 
 class Rendered(NamedTuple):
-    """The rendering of n rays with k samples each.
+    """The rendering of n rays with k samples each."""
 
-    Attributes:
-        colour: [n, 3] sRGB; None where it was not asked for.
-        weights: [n, k] shares of the colour; they sum to 1.
-        distances: [n, k] from the camera, scene units, the middles of the samples.
-        edges: [n, k + 1] the samples' limits in [0, 1], the rays' own measure.
-        first_weights, first_edges: The same of the first search, [n, m] and [n, m + 1].
-    """
-
-    colour: Tensor | None
-    weights: Tensor
-    distances: Tensor
-    edges: Tensor
-    first_weights: Tensor
-    first_edges: Tensor
+    colour: Tensor | None  # [n, 3] sRGB; None where it was not asked for
+    weights: Tensor  # [n, k] shares of the colour; they sum to 1
+    distances: Tensor  # [n, k] from the camera, scene units, the middles of the samples
+    edges: Tensor  # [n, k + 1] the samples' limits in [0, 1], the rays' own measure
+    first_weights: Tensor  # [n, m] those of the first search
+    first_edges: Tensor  # [n, m + 1] those of the first search
 
 
 def contracted(positions: Tensor) -> Tensor:
-    """Points [..., 3] of all space in the ball of radius 2; those within 1 of the origin stay.
-
-    Source: mip-NeRF 360 (Barron et al. 2022), Eq. (10).
-    """
+    """Points [..., 3] of all space in the ball of radius 2; those within 1 of the origin stay (mip-NeRF 360, Eq. (10))."""
     length = positions.norm(dim=-1, keepdim=True).clamp(min=1.0)
     return positions * ((2.0 - 1.0 / length) / length)
 
@@ -91,7 +80,6 @@ class RadianceField(nn.Module):
             n_first, n: The numbers of samples of the first search and of the second one.
             jitter: Whether the samples stand at random places within their intervals.
             hidden: Tells of points [..., 3] whether they are left out; None: none is.
-            coloured: Whether colours are asked for.
         """
         measure = RayMeasure(rays_o, rays_d)
         edges = torch.linspace(0, 1, n_first + 1, device=rays_o.device).expand(len(rays_o), -1)
@@ -135,22 +123,15 @@ class RadianceField(nn.Module):
 
 
 def with_less_gradient(values: Tensor, distances: Tensor) -> Tensor:
-    """Values [n, k, c] of samples whose gradients fall with the square of their distance [n, k] from the camera: near it,
-    points have more samples, and fog would form there.
-
-    Source: Philip and Deschaintre 2023 (Floaters No More), Eq. (5).
-    """
+    """Values [n, k, c] whose gradients fall with the square of their samples' distance [n, k] from the camera: near it, points have
+    more samples, and fog would form there. Source: Philip and Deschaintre 2023 (Floaters No More), Eq. (5)."""
     share = (distances / FULL_GRADIENT).square().clamp(max=1)[..., None]
     return values * share + (values * (1 - share)).detach()
 
 
 class RayMeasure:
-    """A measure of rays from 0 at the near limit to 1 at the far one: t = t0 + CORE sinh(...), where t0 is the distance
-    of the point next to the origin. Its steps are even near the origin and grow with the distance from it.
-
-    Args:
-        rays_o, rays_d: [n, 3].
-    """
+    """A measure of rays [n, 3] from 0 at the near limit to 1 at the far one: t = t0 + CORE sinh(...), where t0 is the distance of
+    the point next to the origin. Its steps are even near the origin and grow with the distance from it."""
 
     def __init__(self, rays_o: Tensor, rays_d: Tensor):
         self.rays_o, self.rays_d = rays_o, rays_d
@@ -191,10 +172,7 @@ def harmonics(d: Tensor) -> Tensor:
 
 
 def search_loss(rendered: Rendered) -> Tensor:
-    """What the samples' weights exceed those of the first search on the intervals that they overlap.
-
-    Source: mip-NeRF 360, Eq. (13).
-    """
+    """What the samples' weights exceed those of the first search on the intervals that they overlap (mip-NeRF 360, Eq. (13))."""
     cumulative = F.pad(rendered.first_weights.cumsum(1), (1, 0))
     first, n = rendered.first_edges.contiguous(), rendered.first_weights.shape[1]
     low = torch.searchsorted(first, rendered.edges[:, :-1].contiguous(), right=True).sub(1).clamp(0, n)
@@ -205,10 +183,7 @@ def search_loss(rendered: Rendered) -> Tensor:
 
 
 def spread_loss(rendered: Rendered) -> Tensor:
-    """How far apart on a ray its weights stand: the mean distance of two of them, in the rays' measure.
-
-    Source: mip-NeRF 360, Eq. (15).
-    """
+    """How far apart on a ray its weights stand: the mean distance of two, in the rays' measure (mip-NeRF 360, Eq. (15))."""
     w, edges = rendered.weights, rendered.edges
     middles, widths = 0.5 * (edges[:, 1:] + edges[:, :-1]), edges.diff(dim=1)
     weight_before = w.cumsum(1) - w

@@ -37,7 +37,6 @@ class Foot:
     """The part of a table that an object stands on, and that over which it hangs.
 
     Args:
-        table: The table.
         inside: [r, r] float32, positive where the object stands; rows along the first of `table.axes`.
         below: [r, r] float32, positive where the object hides the table from above.
     """
@@ -59,7 +58,6 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
     """The foot of an object.
 
     Args:
-        table: The table.
         points: [n, 3] what photos show near the table from above, scene units.
         colours: [n, 3] the photos' colours there.
         standing: [m, 3] points of the object above its foot.
@@ -90,8 +88,7 @@ def find_foot(table: Table, points: np.ndarray, colours: np.ndarray, standing: n
 
 
 def _by_height(medians: np.ndarray, counts: np.ndarray, over: np.ndarray) -> np.ndarray:
-    """[r, r]: positive where cells are higher than the table and connected to what is under the object, else negative; the size
-    says how clearly."""
+    """[r, r] how clearly cells are higher than the table and connected to what is under the object; negative where they are not."""
     weights = np.minimum(counts / ENOUGH, 1.0)
     others = (weights > 0) & ~over
     deviation = 1.4826 * np.median(np.abs(_smoothed(medians, weights)[others])) if others.any() else 0.0

@@ -60,17 +60,14 @@ class Table:
 def find_table(
     points: np.ndarray, centre: np.ndarray, up: np.ndarray, distance: float, random: np.random.Generator
 ) -> tuple[np.ndarray, float] | None:
-    """The plane below the centre, or a little above it with nothing to be seen underneath, on which most points lie.
+    """The plane below the centre, or a little above it with nothing to be seen underneath, on which most points lie: its unit
+    normal, upward, and the normal's product with the plane's points; None where no plane has enough points.
 
     Args:
         points: [n, 3] sparse points.
         centre: [3] the centre of the object.
         up: [3] roughly upward, a unit vector.
         distance: The cameras' distance from the centre.
-        random: The source of random numbers.
-
-    Returns:
-        The unit normal, upward, and its product with the plane's points; None where no plane has enough points.
     """
     if len(points) < 10:
         return None

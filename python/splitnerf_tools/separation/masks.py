@@ -163,15 +163,8 @@ def at_edges(mask: np.ndarray, photo: np.ndarray) -> np.ndarray:
 
 
 def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Tensor, rays_d: Tensor) -> Tensor:
-    """A mask [h, w] with what of its outside other photos show to be solid, but for a rim as wide as they are vague, a cell at
-    least: one cell beside the object is fog.
-
-    Args:
-        mask: The coverage of a view.
-        region: The object.
-        half: The height and width of an image of every other pixel.
-        rays_o, rays_d: [half, 3] the view's rays through that image.
-    """
+    """A mask [h, w] with what of its outside other photos show to be solid, by rays [half, 3] through every other pixel, but for a
+    rim as wide as they are vague, a cell at least: one cell beside the object is fog."""
     if not region.solid.any():
         return mask
     outside = (interpolate(mask[None, None], half, mode="area")[0, 0] < 0.5).view(-1).nonzero().squeeze(1)
@@ -190,15 +183,9 @@ def with_mirrors(mask: Tensor, region: Region, half: tuple[int, int], rays_o: Te
 def with_background(
     field: RadianceField, region: Region, dataset: Dataset, index: int, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A mask with what beside it looks unlike its background, and the background.
+    """The mask [h, w] of photo `index` with what beside it looks unlike its background, and the background.
 
     A glossy outline that mirrors the surroundings looks transparent to the field, but not like what is behind it.
-
-    Args:
-        field, region: The whole place, and the object in it.
-        dataset: The photos.
-        index: The photo.
-        mask: [h, w] its mask.
 
     Returns:
         The mask [h, w], and [h, w, 4] in [0, 1] what the photo would show without the object, along the mask's edges: sRGB at
@@ -234,13 +221,8 @@ def with_background(
 
 @torch.no_grad()
 def surroundings(field: RadianceField, region: Region, points: np.ndarray) -> np.ndarray:
-    """[HEIGHT, 2 HEIGHT, 4] the linear radiance that reaches the object's middle, and how well photos tell it, in [0, 1].
-
-    Args:
-        field: The field.
-        region: The object, through which the rays pass.
-        points: [n, 3] what the photos show, see :func:`surface_points`.
-    """
+    """[HEIGHT, 2 HEIGHT, 4] the linear radiance that reaches the middle of the object, through which the rays pass, and how well
+    photos tell it, in [0, 1]. `points` [n, 3] are what the photos show, see :func:`surface_points`."""
     middle = region.middle()
     directions = torch.from_numpy(directions_of_texels(HEIGHT)[0].reshape(-1, 3).astype(np.float32))
     colours = [

@@ -27,7 +27,6 @@ class Region:
 
     Args:
         cells: [CELLS, CELLS, CELLS] bool.
-        table: The table or None.
         foot: The object's foot; None where the cells go down to the table.
         solid: [CELLS, CELLS, CELLS] bool, the cells in which several photos show the object's surface; None: none are known.
     """
@@ -113,13 +112,8 @@ def _at(cells: Tensor, points: Tensor) -> Tensor:
 
 
 def find_region(points: np.ndarray, table: Table | None, n_photos: int = 1) -> Region | None:
-    """The object's region; None where nothing stands in the middle.
-
-    Args:
-        points: [n, 3] surface points that photos show, scene units, as many of each photo, photo by photo.
-        table: The table or None.
-        n_photos: The number of photos.
-    """
+    """The object's region; None where nothing stands in the middle. `points` are the surface points [n, 3] that photos show, scene
+    units, as many of each photo, photo by photo."""
     if table is None:
         chosen = np.linalg.norm(points, axis=1) < 1
     else:

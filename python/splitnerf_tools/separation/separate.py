@@ -34,19 +34,15 @@ def separate(train: Dataset, test: Dataset | None, folder: Path, *, steps: int, 
     """Writes a mask for each photo, what is behind the object, `surroundings.exr`, `ground.json` where a table is found, and
     `sheet.jpg`, which shows some of the masks, into an empty folder; returns the seconds that it took.
 
-    A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the
-    plane of a table if there is one, and hangs together in the middle, is the object.
+    A radiance field of the whole place is trained on the photos. What it shows within what all cameras look at, above the plane of
+    a table if there is one, and hangs together in the middle, is the object. Raises InputError where nothing stands in the middle,
+    and RuntimeError where numbers of the training are no longer finite.
 
     Args:
         train: The photos, without masks.
         test: Photos that get masks but are not trained on; or None.
         folder: The folder; what is in it is deleted once the object is found.
         steps, minutes: See :func:`splitnerf_tools.separation.training.train_field`.
-        seed: The seed of the random numbers.
-
-    Raises:
-        InputError: Nothing stands in the middle.
-        RuntimeError: Numbers of the training are no longer finite.
     """
     started = time.monotonic()
     refuse_foreign(folder)
@@ -93,13 +89,8 @@ def find_object(field: RadianceField, photos: Dataset, table: Table | None, poin
 
 
 def table_under(points: np.ndarray, dataset: Dataset, seed: int) -> Table | None:
-    """The plane on which the object stands or, where there is none, the wall behind it; None without both.
-
-    Args:
-        points: [n, 3] what the photos show, scene units.
-        dataset: The photos.
-        seed: The seed of the search.
-    """
+    """The plane on which the object stands or, where there is none, the wall behind it; None without both. `points` [n, 3] are what
+    the photos show, scene units."""
     random = np.random.default_rng(seed)
     near = points[np.linalg.norm(points, axis=1) < NEAR_TABLE]
     near = near[random.permutation(len(near))[:MOST_POINTS]].astype(np.float64)

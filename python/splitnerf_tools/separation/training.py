@@ -24,17 +24,12 @@ WARM_UP = 100  # steps
 def train_field(
     dataset: Dataset, *, steps: int, minutes: float, seed: int, report: Callable[[float, str], None]
 ) -> RadianceField:
-    """Trains a field on whole photos.
+    """Trains a field on whole photos. Raises RuntimeError where numbers are no longer finite.
 
     Args:
         dataset: The photos; their alpha is not used.
-        steps: The number of steps.
         minutes: The time after which the training ends; 0: it makes all steps.
-        seed: The seed of the random numbers.
         report: Called with the share done and what to tell of it.
-
-    Raises:
-        RuntimeError: Numbers are no longer finite.
     """
     torch.manual_seed(seed)
     source = PixelSource(dataset, 0.0, torch.Generator().manual_seed(seed))

@@ -67,7 +67,8 @@ class SynthSettings:
 
 
 def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, settings: SynthSettings) -> Path:
-    """Renders a dataset with truth.
+    """Renders a dataset with truth; returns `out`, the folder to train on. Raises InputError where the asset, a map, the folder or
+    a setting cannot be used, and OSError where a file cannot be written.
 
     The asset is moved and scaled so that its bounding box is centred at the origin and its farthest vertex lies on the
     unit sphere; its emission is left out, so that the environment is the only light. A GLB file is copied to
@@ -78,14 +79,6 @@ def synthesise(asset: Path, light: Path, relight: Sequence[Path], out: Path, set
         light: The environment map of the photos.
         relight: The maps of the relit test views.
         out: The dataset's folder, absent or empty.
-        settings: What to render.
-
-    Returns:
-        The folder to train on, `out`.
-
-    Raises:
-        InputError: The asset, a map, the folder or a setting cannot be used.
-        OSError: A file cannot be written.
     """
     settings.check()
     if out.exists() and (not out.is_dir() or any(path.name != LOCK for path in out.iterdir())):
@@ -174,12 +167,8 @@ HEADER = 20  # of the file and of its first chunk, which is the JSON
 
 
 def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: float) -> bool:
-    """Writes the asset with a node above its scene that applies (x - centre) scale, `centre` [3] in the source's world, z up, and
-    without emission; whether the file was written, as a .gltf is not copied, whose data are in other files.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Writes a GLB below a node that applies (x - centre) scale, `centre` [3] in the source's world, z up, and without emission;
+    False, and no file, of a .gltf and of a GLB with data in other files. Raises OSError where the file cannot be written."""
     data = source.read_bytes()
     if data[:4] != b"glTF":
         return False
@@ -207,16 +196,12 @@ def write_placed_glb(source: Path, target: Path, centre: np.ndarray, scale: floa
 
 
 def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float = 0.0) -> np.ndarray:
-    """Cameras spread evenly over a band of the sphere, on a golden spiral.
+    """[n, 4, 4] float64 camera-to-world, OpenGL axes: cameras spread evenly over a band of the sphere, on a golden spiral.
 
     Args:
-        n: Number of cameras.
         distance: From the origin.
         elevations: Lowest and highest, in degrees from the horizon.
         turn: Azimuth of the first, in degrees.
-
-    Returns:
-        [n, 4, 4] float64 camera-to-world, OpenGL axes.
     """
     golden_turn = 360 / ((1 + np.sqrt(5)) / 2)
     heights = np.linspace(*np.sin(np.radians(elevations)), n)
@@ -224,17 +209,13 @@ def spiral(n: int, distance: float, elevations: tuple[float, float], turn: float
 
 
 def orbit(n: int, distance: float, elevation: float, swing: float = 0.0, start: float = 0.5) -> np.ndarray:
-    """Cameras on one turn about the vertical.
+    """[n, 4, 4] float64 camera-to-world, OpenGL axes: cameras on one turn about the vertical.
 
     Args:
-        n: Number of cameras.
         distance: From the origin.
         elevation: Mean elevation in degrees.
         swing: Amplitude in degrees with which the elevation goes up and down, twice a turn.
         start: Azimuth of the first, in steps of 360 / n degrees.
-
-    Returns:
-        [n, 4, 4] float64 camera-to-world, OpenGL axes.
     """
     share = np.arange(n) / n
     return _poses(360 * (share + start / n), elevation + swing * np.sin(4 * np.pi * share), distance)

@@ -121,15 +121,12 @@ SHAPES = {f.__name__: f for f in (bowl, mug, box, vase, shell, rings, plinth, ma
 
 
 def shape_asset(shape: str, material: str, resolution: int = RESOLUTION) -> Asset:
-    """A built-in shape as a mesh with albedos at its vertices.
+    """A built-in shape as a mesh with albedos at its vertices. Raises KeyError where the shape or the material is unknown.
 
     Args:
         shape: One of `SHAPES`.
         material: One of `MATERIALS`.
         resolution: Nodes along an edge of the mesher's grid.
-
-    Raises:
-        KeyError: The shape or the material is unknown.
     """
     distance, (roughness, metallic) = SHAPES[shape], MATERIALS[material]
     vertices, triangles = extract_mesh(lambda p: torch.from_numpy(distance(p.numpy())), BOX, resolution)

@@ -27,15 +27,13 @@ Maps = dict[str, np.ndarray]
 
 
 class SceneWriter:
-    """Takes the renderings of one scene; the files that name the views are written last, by `close`.
+    """Takes the renderings of one scene; the files that name the views are written last, by `close`. Any method raises OSError
+    where a file cannot be written.
 
     Args:
         root: The dataset's folder; made where it is missing.
         camera_angle_x: Horizontal field of view of all cameras, in radians.
         layout: One of `LAYOUTS`.
-
-    Raises:
-        OSError: A file cannot be written (any method).
     """
 
     def __init__(self, root: Path, camera_angle_x: float, layout: str = "blender"):
@@ -43,15 +41,8 @@ class SceneWriter:
         self._views: dict[str, list[tuple[Path, dict]]] = {}
 
     def light(self, environment: np.ndarray, name: str | None = None) -> np.ndarray:
-        """Writes an environment map.
-
-        Args:
-            environment: [h, w, 3] linear radiance.
-            name: The map's name; None for the light of the photos.
-
-        Returns:
-            The map as the file holds it, to render with.
-        """
+        """Writes an environment map, [h, w, 3] linear radiance, and returns it as the file holds it, to render with. Its name is
+        None for the light of the photos."""
         path = self.root / ("light.hdr" if name is None else f"{PREFIX}{name}.hdr")
         write_image(path, environment)
         return read_radiance(path)

@@ -64,7 +64,8 @@ class Source:
 
 
 class ViewedAssets:
-    """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown.
+    """One or two assets and their lights. Lights that are dropped onto the page are added while it is shown. Raises InputError
+    where an asset or the light cannot be read.
 
     Args:
         paths: Runs' folders or GLB files.
@@ -74,9 +75,6 @@ class ViewedAssets:
         sources: The assets.
         problems: One line for each file of an asset that cannot be read.
         frame: The part of space that the first camera shows; None for that of the first asset.
-
-    Raises:
-        InputError: An asset or the light cannot be read.
     """
 
     def __init__(self, paths: list[Path], light: Path | None = None):
@@ -111,11 +109,8 @@ class ViewedAssets:
         self._kept = self._next
 
     def drop(self, name: str, content: bytes) -> int:
-        """Adds a light from the bytes of an .exr or .hdr file; returns its number.
-
-        Raises:
-            InputError: The bytes are not such a file; the message names it.
-        """
+        """Adds a light from the bytes of an .exr or .hdr file; returns its number. Raises InputError, which names it, where the
+        bytes are not such a file."""
         name = plain(PurePosixPath(name.replace("\\", "/")).name)[:100]
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"light{Path(name).suffix.lower()}"
@@ -150,15 +145,12 @@ class ViewedAssets:
         }
 
     def source_of(self, path: Path, name: str | None = None, light: int | None = None) -> Source:
-        """The asset of a run's folder or a GLB; the light in the folder of a `mesh.glb` belongs to it.
+        """The asset of a run's folder or a GLB; the light in the folder of a `mesh.glb` belongs to it. Raises InputError where it
+        cannot be read.
 
         Args:
-            path: The folder or the GLB.
             name: Its name in the page; None for that of the folder or file.
             light: The number for its light; None for a new one.
-
-        Raises:
-            InputError: It cannot be read.
         """
         if not path.exists():
             raise InputError(f"{path}: no such run or .glb file")
@@ -185,25 +177,14 @@ def run_name(glb: Path) -> str:
 
 
 def light_of(path: Path, name: str) -> ViewedLight:
-    """The light of an .exr or .hdr file, made smaller where it has more rows than are kept.
-
-    Raises:
-        InputError: It cannot be read.
-    """
+    """The light of an .exr or .hdr file, with at most MOST_ROWS rows. Raises InputError where it cannot be read."""
     radiance = light_named(path)
     height = min(radiance.shape[0], MOST_ROWS)
     return ViewedLight(name, resize_environment(radiance, height, 2 * height))
 
 
 class ViewedPhotos:
-    """All photos of a data set, in its order.
-
-    Args:
-        root: The data's folder.
-
-    Raises:
-        InputError: The data cannot be used, or an image is missing.
-    """
+    """All photos of a data set, in its order. Raises InputError where the data cannot be used, or an image is missing."""
 
     def __init__(self, root: Path):
         if not root.is_dir():
@@ -232,11 +213,8 @@ class ViewedPhotos:
         ]
 
     def png(self, number: int) -> bytes:
-        """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent at invalid pixels.
-
-        Raises:
-            InputError: It cannot be read, or is gone.
-        """
+        """A photo without its lens's distortion, averaged down to at most 1600 pixels; transparent at invalid pixels. Raises
+        InputError where it cannot be read, or is gone."""
         frame, factor = self._frames[number], -(-max(self._sizes[number]) // LARGEST)
         try:
             photo = load_photo(frame, factor, "object")

@@ -50,11 +50,8 @@ class Camera:
 
     @staticmethod
     def of(content: object, n_assets: int) -> Camera:
-        """The camera of a page's JSON, whose keys are the attributes.
-
-        Raises:
-            InputError: A value is missing or cannot be used.
-        """
+        """The camera of a page's JSON, whose keys are the attributes. Raises InputError where a value is missing or cannot be
+        used."""
         try:
             pose = np.reshape(np.array(content["pose"], np.float64), (4, 4))
             intrinsics = tuple(float(value) for value in content["intrinsics"])
@@ -87,22 +84,17 @@ class Camera:
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of an asset: `content` is [height, width] float16 RGBA, linear, premultiplied; `spp` its paths a
-    pixel."""
+    """One picture of an asset."""
 
     asset: int
     width: int
     height: int
-    spp: int
-    content: bytes
+    spp: int  # paths a pixel
+    content: bytes  # [height, width] float16 RGBA, linear, premultiplied
 
 
 class Tracer:
-    """Traces one request at a time; a newer request ends the one before.
-
-    Args:
-        shown: The assets and lights.
-    """
+    """Traces one request at a time; a newer request ends the one before."""
 
     def __init__(self, shown: ViewedAssets):
         self._shown = shown
@@ -111,12 +103,8 @@ class Tracer:
         self._newest, self._counting, self._working = 0, threading.Lock(), threading.Lock()
 
     def pictures(self, camera: Camera, gone: Callable[[], bool]) -> Iterator[Picture]:
-        """Better and better pictures of each asset, until all passes are made, a newer request comes, or `gone` returns
-        true.
-
-        Raises:
-            InputError: A light is no longer kept.
-        """
+        """Better and better pictures of each asset, until all passes are made, a newer request comes, or `gone` returns true.
+        Raises InputError where a light is no longer kept."""
         mine = self._next()
         lights = [self._light(number, camera.turn) for number in camera.lights]
 
@@ -158,8 +146,7 @@ class Tracer:
         passes: tuple[int, ...],
         ended: Callable[[], bool],
     ) -> Iterator[Picture]:
-        """The mean of all passes so far, after each pass, for each asset with its light; a slow reader blocks no other
-        request."""
+        """The mean of all passes so far, after each pass, for each asset with its light; a slow reader blocks no other request."""
         sums, total = [np.zeros((camera.height, camera.width, 4), np.float32) for _ in scenes], 0
         for number, spp in enumerate(passes):
             if total >= camera.paths:

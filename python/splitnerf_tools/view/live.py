@@ -40,9 +40,6 @@ CURVES = ("step", "seconds", "psnr", "loss")  # and the terms of the loss
 class Live:
     """An observer that shows a run in the page while it trains. As long as no page is open, it does nothing between steps.
 
-    Args:
-        name: The name of the run in the page.
-
     Attributes:
         shown: The assets of the server: the run's surface so far, and its light.
         events: The newest state for the pages: `stage`; `step` of `steps` (null where the time alone counts),
@@ -117,11 +114,8 @@ class Live:
     # ---- called by the server's threads ----
 
     def ask(self, button: str) -> None:
-        """Requests what a button stands for; the training reads the request after its step.
-
-        Raises:
-            InputError: There is no such button, or the run does not train.
-        """
+        """Requests what a button stands for; the training reads the request after its step. Raises InputError where there is no
+        such button, or the run does not train."""
         if button not in {*REQUESTS, "resume"}:
             raise InputError("there is no such button")
         with self._lock:
@@ -243,20 +237,8 @@ LINEAR = 9729  # glTF's filter; smaller pictures of the texture would mix its fa
 
 @torch.no_grad()
 def training_asset(model: SceneModel, world_from_box: np.ndarray, resolution: int = RESOLUTION) -> Asset:
-    """The surface of a scene in the data's world, z up.
-
-    Albedo is a colour at each vertex. Roughness and metallic are its texture coordinates: the texture holds at each
-    place the pair that stands for it, so that they vary linearly over a triangle as the colour does.
-
-    Args:
-        model: The scene; it is not changed.
-        world_from_box: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
-        resolution: Nodes along an edge of the box.
-
-    Raises:
-        EmptyMesh: The surface is empty.
-        RuntimeError: A field is not finite.
-    """
+    """A scene's surface in the data's world, z up. Its texture coordinates stand for roughness and metallic, which are thus linear
+    over a triangle. Raises EmptyMesh where the surface is empty, RuntimeError where a field is not finite."""
     surface = surface_of(model)
     vertices, faces = extract_mesh(surface.sdf, model.config.constants.box, resolution)
     albedo, roughness, metallic, normals = surface_materials(surface, vertices)

@@ -61,21 +61,17 @@ class Refused(Exception):
 
 
 class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
-    """Serves the page, its assets and lights; each request has a thread of its own.
+    """Serves the page, its assets and lights; each request has a thread of its own. Raises InputError where the address or the port
+    cannot be used.
 
     Args:
-        shown: The assets and lights.
         photos: The photos whose cameras are shown, or None.
-        host: The address to listen at.
         port: The port; 0 takes a free one.
         live: The run in training, or None.
 
     Attributes:
         url: The address of the page, token included.
         events: The states for open pages.
-
-    Raises:
-        InputError: The address or the port cannot be used.
     """
 
     daemon_threads = True
@@ -115,8 +111,7 @@ class ViewServer(socketserver.ThreadingMixIn, socketserver.TCPServer):
         return inner if hmac.compare_digest(token.encode(), self._token.encode()) else None
 
     def is_own(self, address: str) -> bool:
-        """Whether a `Host`, or an `Origin` without its scheme, is this server's: a name of another machine may lead
-        here."""
+        """Whether a `Host`, or an `Origin` without its scheme, is this server's: a name of another machine may lead here."""
         try:
             parts = urlsplit(f"//{address}")
             name, port = parts.hostname or "", parts.port or 80

@@ -14,15 +14,8 @@ POLL = 0.1  # seconds between the server's checks for its end
 
 @contextmanager
 def training_page(name: str, port: int) -> Iterator[Live]:
-    """Serves the page of a run within the block, prints its address, and sends the page how the run ended.
-
-    Args:
-        name: The name of the run in the page.
-        port: The port of 127.0.0.1; 0 takes a free one.
-
-    Raises:
-        InputError: The port cannot be used.
-    """
+    """Serves the page of a run within the block, prints its address, and sends the page how the run ended. It listens at 127.0.0.1;
+    port 0 takes a free one. Raises InputError where the port cannot be used."""
     live = Live(name)
     with ViewServer(live.shown, port=port, live=live) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": POLL}, daemon=True)
