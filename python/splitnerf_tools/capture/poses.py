@@ -207,8 +207,9 @@ def _best_model(
     options: pycolmap.IncrementalPipelineOptions,
     report: Callable[[float], None],
 ) -> pycolmap.Reconstruction | None:
-    """The largest model, adjusted. Where its cameras are doubtful, models with pixels that need not be square, with a lens a photo,
-    and with a lens a focal length compete with it: photos may be squeezed, zoomed or cut without a word in their files."""
+    """The largest model, adjusted. Where its cameras are doubtful, models with pixels that need not be square, with a lens for each
+    photo and then for those of about one focal length are tried too: photos may be squeezed, zoomed or cut without a word in
+    their files. The model that explains most is taken; further lenses must be worth it."""
     with closing(pycolmap.Database.open(database)) as base:
         n = base.num_images()
 
@@ -312,8 +313,9 @@ def _is_in_range(camera: pycolmap.Camera) -> bool:
 
 
 def _adjusted(model: pycolmap.Reconstruction) -> pycolmap.Reconstruction:
-    """The model refined at once, with principal points and all of OPENCV's lens where enough photos tell them; weak cameras go.
-    Cauchy's loss keeps points that are no points, such as highlights and mirrored lamps, from pulling at the cameras."""
+    """The model with everything refined at once: principal points, which stay at the centres where few photos leave them open, and
+    all of OPENCV's lens where enough photos have it. Photos with too few of the points lose their cameras. Cauchy's loss keeps
+    points that are no points, such as highlights and mirrored lamps, from pulling at the cameras."""
     shortest = SHORTEST if model.num_reg_images() > FEW else 2
     photos_of = Counter(image.camera_id for image in map(model.image, model.reg_image_ids()))
     often = [key for key, n in photos_of.items() if n >= MIN_PHOTOS]

@@ -278,7 +278,8 @@ def duplicates(views: Sequence[ReducedView], radius: float) -> list[tuple[int, i
 
 
 def differences(views: Sequence[ReducedView], fit: Fit) -> np.ndarray:
-    """[n] by how many powers of two each photo is brighter than its neighbours in direction (medians); NaN where it has none."""
+    """[n] by how many powers of two each photo is brighter than its neighbours in direction, by the medians over the cells of the
+    hull's surface that both show, and over the neighbours; NaN where it has none."""
     surface = _surface(fit)
     values = np.stack([_seen_values(view, surface, fit.cell) for view in views])
     directions = np.stack([view.place - fit.centre for view in views])
