@@ -38,10 +38,8 @@ def devices() -> list[str]:
 
 
 def covers(architectures: str, major: int, minor: int) -> bool:
-    """Whether kernels built for these architectures (as CMake names them) run on a GPU of this capability.
-
-    Machine code runs on GPUs of its major number from its minor one on, PTX on all later GPUs.
-    """
+    """Whether kernels for these architectures (as CMake names them) run on a GPU of this capability: machine code runs on GPUs of
+    its major number from its minor one on, PTX on all later GPUs."""
     for number, kind in re.findall(r"(\d+)[a-z]?(-real|-virtual)?", architectures):
         older = int(number) <= 10 * major + minor
         if older and (kind != "-real" or int(number) // 10 == major):
@@ -79,10 +77,8 @@ def refuse_one_processor() -> None:
 
 @contextmanager
 def tensor_cores(on: bool) -> Iterator[None]:
-    """Sets whether a GPU multiplies float32 matrices on its tensor cores within the block.
-
-    Tensor cores round the factors to 10 bits (TF32) and add in float32. Products on the CPU do not change.
-    """
+    """Sets whether a GPU multiplies float32 matrices on its tensor cores within the block. They round the factors to 10 bits (TF32)
+    and add in float32. Products on the CPU do not change."""
     products = torch.backends.cuda.matmul
     before = products.fp32_precision
     products.fp32_precision = "tf32" if on else "ieee"
@@ -94,11 +90,9 @@ def tensor_cores(on: bool) -> Iterator[None]:
 
 @contextmanager
 def same_bits(on: bool) -> Iterator[None]:
-    """With ``on``, makes torch add in a fixed order within the block; the program's own operators always do so.
-
-    Without it, threads that scatter into one tensor add in the order in which they arrive. Sums still depend on the
-    number of threads and on the processor's instruction set.
-    """
+    """With ``on``, makes torch add in a fixed order within the block; the program's own operators always do so. Without it, threads
+    that scatter into one tensor add in the order in which they arrive. Sums still depend on the number of threads and on the
+    processor's instruction set."""
     before = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
     try:
         if on:
@@ -149,10 +143,8 @@ def pinned(x: Tensor, device: torch.device) -> Tensor:
 
 
 class SideStream:
-    """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing.
-
-    Neither thread waits for work of the other, except in the methods below; then the GPU waits, not the host.
-    """
+    """The order of another thread's work on a device: on a GPU a CUDA stream, on the CPU nothing. Neither thread waits for work of
+    the other, except in the methods below; then the GPU waits, not the host."""
 
     def __init__(self, device: torch.device):
         self._device, self._stream = device, torch.cuda.Stream(device) if device.type == "cuda" else None
@@ -162,10 +154,8 @@ class SideStream:
         return nullcontext() if self._stream is None else torch.cuda.stream(self._stream)
 
     def follow(self) -> None:
-        """Lets later work here begin when all that the caller has given to the device is done.
-
-        Memory that was made here, and that the caller has freed, is not taken again before that.
-        """
+        """Lets later work here begin when all that the caller has given to the device is done; memory that was made here, and that
+        the caller has freed, is not taken again before that."""
         if self._stream is not None:
             self._stream.wait_stream(torch.cuda.current_stream(self._device))
 

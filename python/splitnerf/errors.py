@@ -25,10 +25,8 @@ def shown(value: object) -> str:
 
 
 class InputError(Exception):
-    """Bad input or usage: one clear line that names the file and says what to do.
-
-    The command line prints it without a traceback and exits with code 2.
-    """
+    """Bad input or usage: one clear line that names the file and says what to do. The command line prints it without a traceback
+    and exits with code 2."""
 
     def __str__(self) -> str:
         return plain(super().__str__())

@@ -26,12 +26,9 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     """Yields a temporary name of the same suffix in the folder of `path`, which is made, that replaces it when the
     block succeeds.
 
-    On any error the temporary file is removed and the old file at `path` stays. The new file is synchronised before it
-    takes the name, so that a power failure leaves the old one or the new one.
-
-    Raises:
-        InputError: The path is a device, a pipe or a socket.
-        OSError: The file cannot be written; the message names it, not the temporary one.
+    On any error the temporary file is removed and the old file at `path` stays. The new file is synchronised before it takes the
+    name, so that a power failure leaves the old one or the new one. Raises InputError where the path is a device, a pipe or a
+    socket, and OSError, which names the file and not the temporary one, where it cannot be written.
     """
     path = Path(path)
     if path.exists() and not path.is_file() and not path.is_dir():

@@ -32,10 +32,8 @@ def control_group(name: str) -> list[str]:
 
 
 def give_back() -> None:
-    """Returns freed memory to the system where the C library is glibc.
-
-    It keeps memory that does not end the heap: arrays of a photo's size between small ones that stay.
-    """
+    """Returns freed memory to the system where the C library is glibc, which keeps what does not end the heap: arrays of a photo's
+    size between small ones that stay."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)

@@ -99,13 +99,9 @@ def reconstruct(
     overwrite: bool = False,
     observer: Observer = NOBODY,
 ) -> tuple[Training, dict | None]:
-    """Trains on a dataset, fills the run's folder and calls the observer. Returns the training and, when finished, its
-    evaluation.
-
-    Raises:
-        InputError: The data, the settings or the run's folder cannot be used; nothing was written or deleted.
-        Diverged, EmptyMesh, OSError: See :meth:`splitnerf.training.loop.Training.complete`.
-    """
+    """Trains on a dataset, fills the run's folder and calls the observer. Returns the training and, when finished, its evaluation.
+    Raises InputError where the data, the settings or the run's folder cannot be used; then nothing was written or deleted. Raises
+    Diverged, EmptyMesh, OSError as :meth:`splitnerf.training.loop.Training.complete` does."""
     check_repeatable(config, device)
     with locked(run):
         check_run(run, resume=resume, overwrite=overwrite)
@@ -135,8 +131,7 @@ def check_repeatable(config: Config, device: torch.device | str) -> None:
 
 
 def for_turntable(config: Config) -> Config:
-    """The settings with those that a light of another rotation in each photo needs. Raises InputError where they hold
-    an occlusion that knows one light alone."""
+    """The settings for a light of another rotation in each photo. Raises InputError where their occlusion knows one light alone."""
     if config.occlusion.kind == "mlp":
         raise InputError("photos of a turntable need occlusion.kind = bits or off; change --set or --preset")
     return config.replace({"shading.method": "split", "run.cuda_graphs": False})
@@ -166,15 +161,10 @@ def load_with_masks(
 
 
 def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Path, *, resume: bool) -> dict | None:
-    """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one.
-    Without a surface (:class:`EmptyMesh`) the environment, the evaluation and the report are still written.
-
-    Args:
-        resume: Whether to continue the refinement, if the scene has not changed since it was interrupted.
-
-    Returns:
-        The evaluation; None where the refinement was interrupted.
-    """
+    """Makes the files of a trained run: meshes, environment, evaluation and report, after a refinement if it has one, which
+    `resume` continues if the scene has not changed since it was interrupted. Returns the evaluation; None where the refinement was
+    interrupted. Raises EmptyMesh where there is no surface; the environment, the evaluation and the report are still written
+    then."""
     config, observer, timings = training.config, training.observer, {"training": training.seconds}
     model, mesh, failure, refines = training.model, None, None, config.refinement.enabled
     if not (refines and resume and training.step == training.resumed_at and (run / STATE).is_file()):
@@ -206,9 +196,8 @@ def deliver(training: Training, dataset: Dataset, test: Dataset | None, run: Pat
 
 
 def refine_trained(run: Path, dataset: Dataset, config: Config, resume: bool, observer: Observer) -> bool:
-    """Refines a run, from what training exported to the run or, in a run that continues, to RUN/trained; returns False
-    where it was interrupted. Where photos or asset cannot be used, or numbers are no longer finite (RuntimeError), the
-    run delivers what training exported."""
+    """Refines a run, from what training exported to it or, in a run that continues, to RUN/trained; False where it was interrupted.
+    Where photos or asset cannot be used, or numbers are not finite (RuntimeError), the run delivers what training exported."""
     if not (run / STATE).is_file():  # else what stands in the run may be a result of the stage that goes on
         move_assets(run, run / TRAINED)
     observer(Event("refinement", path=run / TRAINED))
@@ -245,14 +234,9 @@ def score_run(
     maps: dict[str, Path],
     protocol: Protocol,
 ) -> Evaluated:
-    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields.
-    Where the run learned exposures, each view gets one by its own image.
-
-    Args:
-        mesh: The trained mesh before its decimation, which is scored with the fields; None for that of mesh.glb.
-        timings: Seconds by part, "training" at least; that of a refinement is added.
-        maps: Environment maps of relit views by name, which are rendered of mesh.glb.
-    """
+    """Scores what a run delivers: the asset and its light by path tracing after a refinement, else the trained fields with `mesh`,
+    that before its decimation (None: of mesh.glb). Where the run learned exposures, each view gets one by its own image. `timings`
+    are seconds by part, "training" at least; `maps` those of the relit views, which are of mesh.glb."""
     spp, distance = protocol.spp, protocol.distance()
     asset = read_asset(run / "mesh.glb") if (run / "mesh.glb").is_file() else None
     free = (run / EXPOSURES).is_file()
@@ -273,9 +257,8 @@ def write_run_report(run: Path, model: SceneModel, evaluated: Evaluated, timings
 
 
 def load_run(run: Path, sizes: dict[str, object] | None = None) -> tuple[SceneModel, OccupancyGrid, dict]:
-    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself; `sizes` are settings
-    `export.*` by name, None for those of the run. Raises InputError where there is no run, or its checkpoint cannot be
-    read."""
+    """The trained scene of a run's checkpoint, ready to render, and the checkpoint itself; `sizes` are settings `export.*` by name,
+    None: the run's. Raises InputError where there is no run, or its checkpoint cannot be read."""
     refuse_no_run(run)
     content = load_checkpoint(run / "checkpoint.pt")
     config = config_of(content).replace(sizes or {})
@@ -318,15 +301,10 @@ def evaluate_run(run: Path, data: Path, protocol: Protocol, out: Path | None = N
 def export_run(
     run: Path, out: Path, *, formats: Sequence[str], sizes: dict[str, object], placing: Placing, overwrite: bool
 ) -> Exported:
-    """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`: what the run delivers;
-    with other `sizes`, settings `export.*` by name, or into the run, what was trained. origin.json says where an asset is
-    that is not as the data have it.
-
-    Raises:
-        InputError: The run cannot be used, files would be replaced (unless ``overwrite``), or a format needs a package
-            that is not installed.
-        EmptyMesh: The surface is empty.
-    """
+    """Writes a run's meshes and light into a folder, see :func:`splitnerf.export.scene.write_assets`: what the run delivers; with
+    other `sizes`, settings `export.*` by name, or into the run, what was trained. origin.json says where an asset is that is not as
+    the data have it. Raises EmptyMesh where the surface is empty, and InputError where the run cannot be used, files would be
+    replaced (unless ``overwrite``), or a format needs a package that is not installed."""
     if (is_refined(run) and out.resolve() == run.resolve()) or (out / RECORD).is_file():
         raise InputError(f"{out}: holds what a refinement fitted, which this would replace; give another --out")
     refuse_no_run(run)

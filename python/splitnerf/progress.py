@@ -20,8 +20,7 @@ Item = TypeVar("Item")
 
 
 def ending_signals() -> list[signal.Signals]:
-    """The signals that ask a program to end: Ctrl-C, SIGTERM, and that of a terminal which closes, unless nohup ignores
-    it."""
+    """The signals that ask a program to end: Ctrl-C, SIGTERM, and that of a terminal which closes, unless nohup ignores it."""
     asking = [signal.SIGINT, signal.SIGTERM]
     return asking if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else [*asking, signal.SIGHUP]
 

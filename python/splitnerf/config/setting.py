@@ -13,19 +13,13 @@ LARGEST_FLOAT = 1e30
 
 @dataclass(frozen=True)
 class Limits:
-    """The allowed values of a setting, within its type.
+    """The allowed values of a setting, within its type."""
 
-    Attributes:
-        low, high: The bounds of a number; None for other types.
-        without_low, without_high: Whether the bound itself is excluded.
-        choices: The only allowed values; empty if there is no such list.
-    """
-
-    low: float | None = None
+    low: float | None = None  # the bounds of a number; None for other types
     high: float | None = None
-    without_low: bool = False
+    without_low: bool = False  # whether the bound itself is excluded
     without_high: bool = False
-    choices: tuple = ()
+    choices: tuple = ()  # the only allowed values; empty if there is no such list
 
     def allow(self, value: object) -> bool:
         """Whether a value of the right type is allowed. NaN never is."""

@@ -21,7 +21,6 @@ class Material:
     Textures are float32 with the top row first, sampled bilinearly at `Asset.uv`, and repeat.
 
     Attributes:
-        name: The material's name in the file.
         albedo: (3,) linear factor in [0, 1].
         roughness: Perceptual factor in [0, 1].
         metallic: Factor in [0, 1].
@@ -48,7 +47,6 @@ class Asset:
     """A triangle mesh with materials, in a world with z up.
 
     Attributes:
-        name: The asset's name.
         vertices: [n, 3] float32.
         triangles: [m, 3] int32, counter-clockwise seen from outside.
         normals: [n, 3] float32 unit shading normals.
@@ -111,7 +109,8 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def vertex_tangents(vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """MikkTSpace's tangents of the vertices as they are indexed; no vertex is split.
+    """[n, 4] float32: MikkTSpace's unit tangents, perpendicular to the normals, and the bitangent's sign, 1 or -1, of the vertices
+    as they are indexed; no vertex is split.
 
     A triangle's tangent is the direction of growing u on it. At each of its vertices it is projected on the plane of
     the vertex normal, normalised and weighted with the corner's angle, the edges projected likewise. The bitangent,
@@ -120,9 +119,6 @@ def vertex_tangents(vertices: np.ndarray, triangles: np.ndarray, normals: np.nda
 
     Args:
         vertices, triangles, normals, uv: [n, 3], [m, 3] counter-clockwise seen from outside, [n, 3] unit, and [n, 2].
-
-    Returns:
-        [n, 4] float32, unit tangents perpendicular to the normals, and the bitangent's sign, 1 or -1.
 
     Source: Mikkelsen, "Simulation of Wrinkled Surfaces Revisited" (2008), and glTF 2.0, section 3.7.2.1.
     """

@@ -31,19 +31,12 @@ BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.03
 
 
 class Stated(NamedTuple):
-    """What a file states of its colours.
+    """What a file states of its colours."""
 
-    Attributes:
-        profile: An ICC profile, or None.
-        gamma: The power of the values that is the light; 0 for sRGB's curve.
-        primaries: The chromaticities of red, green, blue and white.
-        is_known: Whether nothing else is stated.
-    """
-
-    profile: bytes | None = None
-    gamma: float = 0.0
-    primaries: tuple[float, ...] = REC709
-    is_known: bool = True
+    profile: bytes | None = None  # an ICC profile
+    gamma: float = 0.0  # the power of the values that is the light; 0: sRGB's curve
+    primaries: tuple[float, ...] = REC709  # chromaticities of red, green, blue and white
+    is_known: bool = True  # whether nothing else is stated
 
 
 def stated_colours(path: Path) -> Stated:
@@ -115,8 +108,7 @@ def _matrix_of(primaries: tuple[float, ...], path: Path) -> np.ndarray | None:
 
 
 def from_space(codes: np.ndarray, gamma: float, primaries: tuple[float, ...], path: Path) -> np.ndarray:
-    """Colours whose light is a power of the values (of gamma 0: by sRGB's curve) in given primaries, as sRGB; as they are where
-    that is about what sRGB is."""
+    """Colours in given primaries as sRGB; their light is a power of the values (gamma 0: sRGB's curve). Unchanged if about sRGB."""
     matrix = _matrix_of(primaries, path) if codes.shape[2] == 3 else None
     if matrix is None and (gamma == 0 or 2.0 < gamma < 2.4):
         return codes
@@ -134,11 +126,8 @@ def from_space(codes: np.ndarray, gamma: float, primaries: tuple[float, ...], pa
 
 
 def to_rec709(primaries: tuple[float, ...]) -> np.ndarray:
-    """[3, 3] from linear colours in primaries to those in Rec. 709's, with one white for the other.
-
-    Source: SMPTE RP 177, derivation of basic television color equations, 1993; the whites by Bradford's cones (Lam,
-    Metamerism and colour constancy, 1985). Not finite where the primaries are none.
-    """
+    """[3, 3] from linear colours in primaries to those in Rec. 709's, with one white for the other; not finite where the primaries
+    are none. Source: SMPTE RP 177, 1993; the whites by Bradford's cones (Lam, Metamerism and colour constancy, 1985)."""
     (ours, our_white), (theirs, white) = to_xyz(REC709), to_xyz(primaries)
     cones = np.diag((BRADFORD @ our_white) / (BRADFORD @ white))
     return np.linalg.inv(ours) @ np.linalg.inv(BRADFORD) @ cones @ BRADFORD @ theirs
@@ -156,8 +145,7 @@ def to_xyz(primaries: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def from_profile(codes: np.ndarray, profile: bytes, path: Path) -> np.ndarray:
-    """Colours [H, W, 1 or 3] of a photo with an ICC profile as sRGB, words in steps of bytes; as they are, with a note, where that
-    cannot be done."""
+    """A photo's colours [H, W, 1 or 3] as sRGB by its ICC profile; as they are, with a note, where that cannot be done."""
     try:
         source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
         name = ImageCms.getProfileDescription(source).strip()

@@ -50,8 +50,6 @@ class Dataset:
     """One split of a posed image set, poses in the internal frame where the object fits the box [-1.5, 1.5]^3.
 
     Attributes:
-        name: The folder's name.
-        root: The folder.
         split: "train" or "test".
         downscale: Integer factor by which the images were averaged down.
         images: [n, H, W, 4] float32, sRGB, straight alpha; brought to one exposure, at which colours are in [0, 1] but for
@@ -59,7 +57,6 @@ class Dataset:
         poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, internal frame.
         intrinsics: [n, 4] float32, (fx, fy, cx, cy) in pixels of the downscaled images; pixel centres at +0.5.
         frame_names: Names of the images' files without extension, or of the view folders.
-        image_paths: The image files.
         box_from_world: [4, 4] float64, uniform scale and translation from the data's world to the internal frame.
         known: [n, H, W] bool, the pixels that say something: not what a mask ignores, not what an undistorted photo
             does not cover, and not what lies beside a photo that is smaller than others; the others are 0 in `images`. None
@@ -136,11 +133,8 @@ class Dataset:
 
     def behind(self, view: int) -> np.ndarray | None:
         """[H, W, 4] float32, what a photo would show without the object: sRGB at the photo's own exposure, and 1 where that is
-        known and not clipped, along the mask's edges, else 0; None where the data do not say.
-
-        Raises:
-            InputError: The file cannot be read.
-        """
+        known and not clipped, along the mask's edges, else 0; None where the data do not say. Raises InputError where the file
+        cannot be read."""
         path, (height, width) = self.behind_paths[view], self.sizes[view].tolist()
         if path is None:
             return None
@@ -234,17 +228,14 @@ def load_dataset(
     *,
     masked: bool = True,
 ) -> Dataset:
-    """Loads one split, "train" or "test", of a posed image set in a folder of any layout.
+    """Loads one split, "train" or "test", of a posed image set in a folder of any layout. Raises InputError where the folder, its
+    files, an image, a mask or a pose cannot be used.
 
     The normalisation is always estimated from the train split, so that train and test share a frame.
 
     Args:
         downscale: Integer factor >= 1, averaged in premultiplied linear light.
-        reading: What the data leave open.
         masked: Whether photos without masks are refused. Without masks the frame is that of what all cameras look at.
-
-    Raises:
-        InputError: The folder, its files, an image, a mask or a pose cannot be used.
     """
     root = Path(root)
     if split not in ("train", "test"):
@@ -396,9 +387,8 @@ class _Contradiction(InputError):
 
 
 def _load_train(root: Path, loader: Loader, reading: Reading) -> tuple[list[Photo], np.ndarray, str]:
-    """The photos of the train split, or of a part of it, the similarity to the internal frame, and what masks of open
-    meaning are. Where the user does not say it, they are the object's unless they keep nearly all of the photos or
-    contradict the poses."""
+    """The photos of the train split, or of a part of it, the similarity to the internal frame, and what masks of open meaning are:
+    the object's, unless the user says otherwise, they keep nearly all of the photos, or they contradict the poses."""
     frames, kind = loader.frames, "ignore" if reading.mask_kind == "ignore" else "object"
     photos = loader.load(kind)
     masked = _has_masks(photos)

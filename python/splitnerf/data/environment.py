@@ -19,16 +19,9 @@ NEGATIVE_SHARE = 1e-3  # largest share of the map's sum; resampling and compress
 
 
 def read_environment(path: str | os.PathLike) -> np.ndarray:
-    """Reads an equirectangular map of linear radiance, u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi from the top.
-
-    Negative pixels that sum to at most a thousandth of the map are set to 0, with a note on stderr.
-
-    Returns:
-        [h, w, 3] float32, finite and >= 0.
-
-    Raises:
-        InputError: Not an EXR or HDR file, not 2:1, black, or with NaN, infinite or many negative pixels.
-    """
+    """[h, w, 3] float32, finite and >= 0: an equirectangular map of linear radiance, u = 0.5 - atan2(y, x)/(2 pi), v = acos(z)/pi
+    from the top. Negative pixels that sum to at most a thousandth of the map are set to 0, with a note on stderr. Raises InputError
+    where the file is no EXR or HDR file, not 2:1 or black, or has NaN, infinite or many negative pixels."""
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such environment map; check the path")

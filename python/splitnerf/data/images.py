@@ -149,16 +149,13 @@ def read_radiance(path: str | os.PathLike) -> np.ndarray:
 
 
 def write_image(path: str | os.PathLike, pixels: np.ndarray, *, half: bool = False) -> None:
-    """Writes an image atomically; the suffix decides the format.
+    """Writes an image atomically; the suffix decides the format. Raises ValueError where the suffix is unknown, the shape is wrong
+    or a pixel is not finite, and OSError where the file cannot be written.
 
     Args:
         path: Ends in .png or .jpg (8 bit, values clipped to [0, 1], alpha straight), .exr or .hdr (linear, as given).
         pixels: [H, W, C] or [H, W], C = 1, 3 or 4.
         half: Whether an EXR is stored as half instead of float.
-
-    Raises:
-        ValueError: Unknown suffix, wrong shape, or non-finite pixels.
-        OSError: The file cannot be written.
     """
     path = Path(path)
     data = encode_image(pixels, path.suffix, str(path), half=half)

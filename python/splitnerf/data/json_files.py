@@ -38,11 +38,6 @@ def need(table: dict, key: str, path: Path, where: str = "") -> object:
 
 
 def write_json(path: Path, content: dict) -> None:
-    """Writes a file atomically, indented, NaN refused.
-
-    Raises:
-        ValueError: A number is NaN or infinite.
-        OSError: The file cannot be written.
-    """
+    """Writes a file atomically, indented. Raises ValueError where a number is not finite, and OSError where writing fails."""
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")

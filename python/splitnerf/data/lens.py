@@ -55,14 +55,8 @@ class Distortion:
     fisheye: bool = False
 
     def bend(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where a photo shows what a pinhole shows at points.
-
-        Args:
-            x, y: The points in the pinhole's image, any shape, in focal lengths from the principal point, y down.
-
-        Returns:
-            x and y in the photo, likewise, and whether the model holds there: farther out its image would fold back.
-        """
+        """Where a photo shows what a pinhole shows at points x, y, any shape, in focal lengths from the principal point, y down: x
+        and y in the photo, likewise, and whether the model holds there: farther out its image would fold back."""
         k1, k2, k3, k4 = self.radial
         p1, p2 = self.tangential
         r2 = x * x + y * y
@@ -86,18 +80,13 @@ class Distortion:
 
 
 def read_lens(numbers: dict, where: str) -> tuple[dict, Distortion | None]:
-    """The pinhole and the distortion that the numbers of a file make.
+    """The pinhole's numbers and the distortion, None where the photo is a pinhole's, that the numbers of a file make. Raises
+    InputError where a number is out of bounds, the focal length is missing, or the camera model is not one of `MODELS`.
 
     Args:
         numbers: `camera_angle_x camera_angle_y` (radians), `fl_x fl_y cx cy w h` (pixels), `k1 ... k4 p1 p2`, `camera_model`
             or `is_fisheye`; what is None or missing is not given.
         where: The file, and the frame if it is one's own lens, for messages.
-
-    Returns:
-        The pinhole's numbers, and the distortion or None where the photo is a pinhole's.
-
-    Raises:
-        InputError: A number is out of bounds, the focal length is missing, or the camera model is not one of `MODELS`.
     """
     numbers = {key: value for key, value in numbers.items() if value is not None}
     if (is_fisheye := numbers.pop("is_fisheye", False)) not in (0, 1):
@@ -162,13 +151,9 @@ def lens_intrinsics(lens: dict, size: tuple[int, int]) -> np.ndarray:
 
 
 def undistort(planes: np.ndarray, distortion: Distortion, intrinsics: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The image that a pinhole with the same focal length, principal point and size takes, of a photo [H, W, C] float32
-    with a distortion, and intrinsics [4] (fx, fy, cx, cy) in pixels, pixel centres at +0.5.
-
-    Returns:
-        [H, W, C] float32, which may leave the photo's range of values a little, and the pixels [H, W] bool that the
-        photo covers; what the others hold has no meaning.
-    """
+    """The image [H, W, C] float32 that a pinhole with the same focal length, principal point and size takes, of a photo [H, W, C]
+    float32 with a distortion, and the pixels [H, W] bool that the photo covers; what the others hold has no meaning. `intrinsics`
+    [4] are (fx, fy, cx, cy) in pixels, pixel centres at +0.5. The image may leave the photo's range of values a little."""
     height, width, channels = planes.shape
     fx, fy, cx, cy = intrinsics
     photo = torch.from_numpy(np.ascontiguousarray(planes.transpose(2, 0, 1)))[None]
@@ -186,10 +171,9 @@ def undistort(planes: np.ndarray, distortion: Distortion, intrinsics: np.ndarray
 
 
 def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
-    """[h, w, C] values of a photo [1, C, H, W] at places [h, w, 2] float64 (x, y), 0 at the first pixel's centre, by Keys' cubic convolution with a = -1/2, which is exact for quadratic functions.
-
-    It is linear in a: two thirds of torch's, with -3/4, and one third of a = 0, bilinear at the fraction 3 t^2 - 2 t^3.
-    """
+    """[h, w, C] values of a photo [1, C, H, W] at places [h, w, 2] float64 (x, y), 0 at the first pixel's centre, by Keys' cubic
+    convolution with a = -1/2, which is exact for quadratic functions. It is linear in a: two thirds of torch's, with -3/4, and one
+    third of a = 0, bilinear at the fraction 3 t^2 - 2 t^3."""
     size = torch.tensor([photo.shape[3], photo.shape[2]])
 
     def sampled(at: Tensor, mode: str) -> Tensor:
@@ -202,11 +186,7 @@ def sample_cubic(photo: Tensor, places: Tensor) -> Tensor:
 
 
 def pixel_width(poses: np.ndarray, intrinsics: np.ndarray, middle: np.ndarray, *, nearest: float = 0.0) -> float:
-    """The width of a pixel at a point `middle` [3], in the unit of the poses, as a median over the photos.
-
-    Args:
-        poses, intrinsics: [n, 4, 4] camera to world, and [n, 4] focal lengths and principal point in pixels.
-        nearest: A distance; cameras that are nearer to the point count as that far from it.
-    """
+    """The width of a pixel at a point `middle` [3], in the unit of the poses [n, 4, 4], as a median over the photos, whose
+    `intrinsics` [n, 4] are in pixels. Cameras that are nearer to the point than `nearest` count as that far from it."""
     distance = np.maximum(np.linalg.norm(poses[:, :3, 3] - middle, axis=1), nearest)
     return float(np.median(distance / intrinsics[:, 0]))

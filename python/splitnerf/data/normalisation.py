@@ -24,11 +24,8 @@ LOOKS_AWAY = (
 
 
 class MasksContradict(ValueError):
-    """No point of space projects into the masks.
-
-    Attributes:
-        views: The few views whose masks miss the point that the most other masks contain; none where many do.
-    """
+    """No point of space projects into the masks. `views` are the few views whose masks miss the point that the most other masks
+    contain; none where many do."""
 
     def __init__(self, views: list[int]):
         super().__init__("masks and poses contradict each other, no point lies in all masks")
@@ -41,8 +38,9 @@ def estimate_box(
     intrinsics: np.ndarray,
     known: Sequence[np.ndarray | None] | None = None,
 ) -> np.ndarray:
-    """The similarity [4, 4] float64 (uniform scale and translation) from the data's world to the frame where the object
-    fits the box [-1.5, 1.5]^3.
+    """The similarity [4, 4] float64 (uniform scale and translation) from the data's world to the frame where the object fits the
+    box [-1.5, 1.5]^3. Raises MasksContradict where no point of space projects into the masks, and ValueError where all cameras
+    stand at one place.
 
     A grid around the point nearest to all optical axes is carved by the masks, then a finer one around what is left.
     Where the hull's bounding sphere about the origin has a radius in (0.4, 1.4] the data's frame is kept: the identity.
@@ -53,10 +51,6 @@ def estimate_box(
         poses: [n, 4, 4] camera-to-world, OpenGL axes.
         intrinsics: [n, 4], (fx, fy, cx, cy) in pixels of `silhouettes`.
         known: n arrays [H, W] bool, the pixels that say something; None for all.
-
-    Raises:
-        MasksContradict: No point of space projects into the masks.
-        ValueError: All cameras stand at one place.
     """
     n, sizes = len(silhouettes), np.array([silhouette.shape for silhouette in silhouettes])
     poses, intrinsics = poses.astype(np.float64), intrinsics.astype(np.float64)
@@ -85,15 +79,12 @@ def estimate_box(
 
 
 def box_of_views(poses: np.ndarray, intrinsics: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The similarity [4, 4] float64 that brings the middle of what all cameras look at to the origin, with a radius of
-    1.
+    """The similarity [4, 4] float64 that brings the middle of what all cameras look at to the origin, with a radius of 1. Raises
+    ValueError where all cameras stand at one place, or they look away from what they have in common.
 
     Args:
         poses, intrinsics: See :func:`estimate_box`.
         sizes: [n, 2] height and width of the photos in pixels.
-
-    Raises:
-        ValueError: All cameras stand at one place, or they look away from what they have in common.
     """
     poses = poses.astype(np.float64)
     _check_places(poses)
@@ -198,11 +189,8 @@ class MaskView:
         return cls(table, pose, intrinsics, known)
 
     def judge(self, points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-        """Whether the view shows points [m, 3], and whether on foreground, [m] bool each.
-
-        A point stands for its cell: it counts as foreground where any mask pixel within the projected half cell is one,
-        counted with the summed-area table.
-        """
+        """Whether the view shows points [m, 3], and whether on foreground, [m] bool each. A point stands for its cell: it counts as
+        foreground where any mask pixel within the projected half cell is one, counted with the summed-area table."""
         visible, (x0, x1, y0, y1) = self._shown(points, cell)
         table = self.table
         return visible, table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] > 0

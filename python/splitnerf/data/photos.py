@@ -92,14 +92,12 @@ def silhouette_factor(height: int, width: int) -> int:
 
 
 def load_photo(frame: Frame, downscale: int, mask_kind: str, separated: Path | None = None) -> Photo:
-    """Reads a frame's image and masks, frees them from the lens's distortion, and averages them down by `downscale`.
+    """Reads a frame's image and masks, frees them from the lens's distortion, and averages them down by `downscale`. Raises
+    InputError where a file cannot be used.
 
     Args:
         mask_kind: "object" or "ignore": what the mask file is where the frame leaves it open.
         separated: The mask that was found for the image, which counts where the frame has none or a full one; or None.
-
-    Raises:
-        InputError: A file cannot be used.
     """
     path = frame.image_path
     pixels, scale = _read_photo(path, frame.gamma)
@@ -199,9 +197,8 @@ def check_files(frames: Sequence[Frame], downscale: int) -> tuple[np.ndarray, bo
 
 
 def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> None:
-    """Raises InputError where one lens is stated for photos of several sizes, and not for which: a focal length in pixels may be
-    that of a camera that was turned, or of crops, an angle or a principal point of photos of one shape. Notes where a principal
-    point lies far from the middle, as of a lens that is stated for another size, or an angle contradicts a focal length."""
+    """Raises InputError where one lens is stated for photos of several sizes, and not for which: the camera may have been turned.
+    Notes a principal point far from the middle, as of a lens for another size, or an angle that contradicts a focal length."""
     first: dict[str, int] = {}
     for i, (frame, (height, width)) in enumerate(zip(frames, sizes)):
         fx, fy, x, y = lens_intrinsics(frame.lens, (height, width))
@@ -235,9 +232,8 @@ def _check_lenses(frames: Sequence[Frame], sizes: Sequence[tuple[int, int]]) -> 
 
 
 def _read_photo(path: Path, gamma: float) -> tuple[np.ndarray, float]:
-    """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied: floats
-    are linear radiance, nearly all of which it brings below PEAK; whole numbers are sRGB or, with a gamma, linear
-    values to the power 1 / gamma."""
+    """The sRGB values of an image, straight alpha, and the factor by which their linear values were multiplied: floats are linear
+    radiance, nearly all below PEAK by the factor; whole numbers are sRGB or, with a gamma, linear values to the power 1 / gamma."""
     pixels = read_colours(path)
     n_colours = 3 if pixels.shape[2] >= 3 else 1
     if pixels.dtype.kind != "f":
@@ -288,16 +284,12 @@ def _undistort(
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """A mask, white where it is set.
+    """A mask [H, W, 1], uint8, uint16, or float32 in [0, 1], white where it is set. Raises InputError where the file cannot be
+    read, is coloured, or holds labels of more than one object, or floats out of bounds.
 
-    Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries in colour. Of two
-    values the larger one is white and the other one black, whatever they are; of two entries that which is black or not white is black.
-
-    Returns:
-        [H, W, 1] uint8, uint16, or float32 in [0, 1].
-
-    Raises:
-        InputError: The file cannot be read, is coloured, holds labels of more than one object, or floats out of bounds.
+    Where the alpha channel varies it is the mask; else the colours are, which must be grey, or of two palette entries in colour. Of
+    two values the larger one is white and the other one black, whatever they are; of two entries that which is black or not white
+    is black.
     """
     pixels = read_codes(path)
     if pixels.dtype.kind == "f" and not (pixels.min() >= 0 and pixels.max() <= 1):  # false for NaN
@@ -342,7 +334,8 @@ def _palette_entries(path: Path) -> np.ndarray | None:
 
 
 class Loader:
-    """The photos of some frames. All sizes are known, and all is estimated, before the first pixel is read.
+    """The photos of some frames. All sizes are known, and all is estimated, before the first pixel is read. Raises InputError where
+    a file cannot be used, or neither memory nor disk can hold the photos.
 
     Args:
         reading: How the frames are read; its `max_memory` counts the photos that are in memory already.
@@ -352,9 +345,6 @@ class Loader:
         sizes: [n, 2] height and width of the photos as they are kept, in the upper left corner of an array for the
             tallest and the widest.
         exposures: [n] float64, the factors of the photos' linear values, as they are kept.
-
-    Raises:
-        InputError: A file cannot be used, or neither memory nor disk can hold the photos.
     """
 
     def __init__(self, root: Path, frames: Sequence[Frame], downscale: int, reading: Reading, keep: bool = True):

@@ -27,14 +27,9 @@ Distance = Callable[[np.ndarray, np.ndarray], float]
 
 
 class Lpips:
-    """The distance of two [H, W, 3] sRGB images in [0, 1] of at least 16 x 16 pixels; 0 for equal ones.
-
-    Args:
-        backbone: A file with the state of torchvision's VGG16.
-
-    Raises:
-        InputError: The file holds something else, or the package lpips is not there; the message says what to do.
-    """
+    """The distance of two [H, W, 3] sRGB images in [0, 1] of at least 16 x 16 pixels; 0 for equal ones. `backbone` is a file with
+    the state of torchvision's VGG16. Raises InputError where it holds something else, or the package lpips is not there; the
+    message says what to do."""
 
     def __init__(self, backbone: Path):
         package = find_spec("lpips")

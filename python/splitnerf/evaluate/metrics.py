@@ -22,11 +22,9 @@ def psnr(prediction: np.ndarray, truth: np.ndarray) -> float:
 
 
 def ssim(prediction: np.ndarray, truth: np.ndarray) -> float:
-    """Structural similarity of images [H, W, C], at most 1: 11 x 11 Gaussian window of sigma 1.5, data range 1, mean
-    over full windows and channels. Images smaller than the window are compared with the largest window that fits.
-
-    Source: Wang et al., Image quality assessment: from error visibility to structural similarity, 2004.
-    """
+    """Structural similarity of images [H, W, C], at most 1: 11 x 11 Gaussian window of sigma 1.5, data range 1, mean over full
+    windows and channels. Images smaller than the window are compared with the largest window that fits. Source: Wang et al., Image
+    quality assessment: from error visibility to structural similarity, 2004."""
     x, y = np.asarray(prediction, np.float64), np.asarray(truth, np.float64)
     radius = min(5, (min(x.shape[:2]) - 1) // 2)
 
@@ -72,11 +70,9 @@ def balanced_accuracy(prediction: np.ndarray, truth: np.ndarray) -> float:
 
 
 def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
-    """PSNR in dB, at most 100, of an environment map [H, W, 3] after removing the scale that albedo and light share.
-
-    Both maps are brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the
-    truth's 99th percentile and clipped to [0, 1]; pixels weigh by their solid angle.
-    """
+    """PSNR in dB, at most 100, of an environment map [H, W, 3] after removing the scale that albedo and light share: both maps are
+    brought to 256 x 128, the prediction is scaled per channel by least squares, both are divided by the truth's 99th percentile and
+    clipped to [0, 1]; pixels weigh by their solid angle."""
     x, y = (resize_environment(image, *LIGHT_SIZE).reshape(-1, 3).astype(np.float64) for image in (light, truth))
     weights = directions_of_texels(LIGHT_SIZE[0])[1].ravel()
     white = max(np.percentile(y, 99), 1e-8)
@@ -86,12 +82,9 @@ def light_psnr(light: np.ndarray, truth: np.ndarray) -> float:
 
 
 def mesh_distances(mesh: trimesh.Trimesh, truth: trimesh.Trimesh, samples: int = MESH_SAMPLES) -> tuple[float, float]:
-    """Chamfer distance and F-score between two surfaces in one frame, by `samples` points spread over each.
-
-    Returns:
-        The mean of both directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares
-        of points that lie within 1 % of the diagonal of the truth's bounding box, in [0, 1].
-    """
+    """Chamfer distance and F-score between two surfaces in one frame, by `samples` points spread over each: the mean of both
+    directions' mean nearest distance, in units of the meshes, and the harmonic mean of the shares of points that lie within 1 % of
+    the diagonal of the truth's bounding box, in [0, 1]."""
     points, targets = (np.asarray(trimesh.sample.sample_surface(m, samples, seed=0)[0]) for m in (mesh, truth))
     to_truth, _ = cKDTree(targets).query(points)
     to_mesh, _ = cKDTree(points).query(targets)

@@ -121,14 +121,11 @@ def on_white(linear: np.ndarray, alpha: np.ndarray, scale: np.ndarray | float = 
 def scaled_scores(
     views: Callable[[], Iterable[ScaledView]], distance: Distance | None = None
 ) -> tuple[dict, dict[str, dict]]:
-    """Scores predictions with one free factor per channel for all views together; `views` is called twice.
+    """Scores predictions with one free factor per channel for all views together: `psnr`, `ssim`, `lpips` of the headline, then the
+    variants with their `scale` [3]; and the headline's scores per group. `views` is called twice.
 
     The factor is fitted in linear light over the foreground of all views, alpha > 0.9 in prediction and truth. `raw`
     has no factor, `lsq` that of least squares (the headline).
-
-    Returns:
-        The scores (`psnr`, `ssim`, `lpips` of the headline, then the variants with their `scale` [3]), and the
-        headline's scores per group.
     """
     scales = _scales(views())
     scores: dict[str, list[dict]] = {name: [] for name in scales}

@@ -86,8 +86,7 @@ class Evaluated:
 
 @dataclass
 class RelitViews:
-    """The relit views of a dataset with `spp` paths a pixel: images [H, W, 4] uint8, sRGB with straight alpha, by map
-    and by view."""
+    """Images [H, W, 4] uint8, sRGB with straight alpha, by map and by view, of a dataset relit with `spp` paths a pixel."""
 
     images: dict[str, list[np.ndarray]]
     dataset: Dataset
@@ -137,13 +136,9 @@ def relight(renderer: AssetRenderer, dataset: Dataset, maps: dict[str, Path], sp
 
 
 def relight_scores(relit: RelitViews, distance: Distance | None = None) -> dict:
-    """Scores relit views with one factor per channel for all images of all maps. Predictions are 8-bit clipped sRGB
-    images before the factor, as if read from files.
-
-    Returns:
-        The scores of :func:`splitnerf.evaluate.protocol.scaled_scores`, `maps` (the headline's scores per map), `views`
-        (their number) and `spp`.
-    """
+    """The scores of relit views with one factor per channel for all images of all maps, see
+    :func:`splitnerf.evaluate.protocol.scaled_scores`, with `maps` (the headline's scores per map), `views` (their number) and
+    `spp`. Predictions are 8-bit clipped sRGB images before the factor, as if read from files."""
     scores, per_map = scaled_scores(relit.views, distance)
     return scores | {"maps": per_map, "views": len(relit.dataset), "spp": relit.spp}
 

@@ -58,7 +58,9 @@ def bands(uv: np.ndarray, faces: np.ndarray, size: int) -> Iterator[Texels]:
 def bake(
     mesh: Asset, surface: Surface, size: int, *, reach: float, offset: float, on_surface: np.ndarray | None = None
 ) -> tuple[Material, np.ndarray]:
-    """Evaluates the fields at each texel's point, which is first moved onto the zero level set along the mesh's normal.
+    """The material with its textures, and [size, size] occlusion in [0, 1], 1 = open: the fields at each texel's point, which is
+    first moved onto the zero level set along the mesh's normal. Raises RuntimeError where the texture is too small for the mesh, or
+    the materials are not finite.
 
     The texels are evaluated in bands, so that the memory in addition to the maps does not grow with the texture. A
     texel outside the charts has the value of the nearest texel inside.
@@ -70,12 +72,6 @@ def bake(
         offset: The distance of an occlusion ray's start from the mesh along its normal.
         on_surface: [n] bool, the vertices of the zero level set; texels of faces with others have the mesh's normals,
             and the materials of the nearest one of these vertices. None: all.
-
-    Returns:
-        The material with its textures, and [size, size] occlusion in [0, 1], 1 = open.
-
-    Raises:
-        RuntimeError: The texture is too small for the mesh, or the materials are not finite.
     """
     albedo, roughness_metallic, normal = (np.zeros((size * size, width), np.float32) for width in (3, 2, 3))
     covered = np.zeros(size * size, bool)
@@ -142,11 +138,8 @@ def bake_occlusion(mesh: Asset, size: int, offset: float) -> np.ndarray:
 
 
 def to_tangent_space(world: np.ndarray, normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-    """World normals [n, 3] in the frames (T, sign * cross(N, T), N) of interpolated N [n, 3] and T [n, 4].
-
-    N and T are taken as interpolated, not normalised, as MikkTSpace's decoder does. Normals that face into the
-    interpolated surface are raised above it.
-    """
+    """World normals [n, 3] in the frames (T, sign * cross(N, T), N) of N [n, 3] and T [n, 4], interpolated and not normalised, as
+    MikkTSpace's decoder takes them. Normals that face into the interpolated surface are raised above it."""
     tangent = tangents[:, :3]
     bitangent = np.sign(tangents[:, 3:]) * np.cross(normals, tangent)
     # Cramer's rule for x T + y B + z N = world

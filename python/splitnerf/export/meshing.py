@@ -24,7 +24,8 @@ class EmptyMesh(RuntimeError):
 def extract_mesh(
     sdf: Callable[[Tensor], Tensor], box: float, resolution: int, *, dense: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Marching cubes over [-box, box]^3, closed at the border, with outward faces.
+    """Marching cubes over [-box, box]^3, closed at the border: vertices [n, 3] float32 and outward faces [m, 3] int32. Raises
+    EmptyMesh where no node is inside the surface, and RuntimeError where the field is not finite.
 
     The grid is refined from coarse to fine. A cube of nodes contains no surface if the distance at its centre is larger
     than 1.5 times its half diagonal; all its nodes get the centre's sign. Other cubes are halved, down to blocks of 4^3
@@ -35,13 +36,6 @@ def extract_mesh(
         sdf: A function from points [n, 3] to signed distances [n], negative inside.
         resolution: The number of nodes along an edge.
         dense: Whether to evaluate all nodes.
-
-    Returns:
-        vertices [n, 3] float32 and faces [m, 3] int32.
-
-    Raises:
-        EmptyMesh: No node is inside the surface.
-        RuntimeError: The field is not finite.
     """
     grid = _NodeGrid(sdf, box, resolution)
     index = np.zeros((grid.n_blocks,) * 3, np.int32) if dense else grid.near_blocks()
@@ -62,10 +56,8 @@ def extract_mesh(
 
 
 class _NodeGrid:
-    """resolution^3 nodes over the box in a shell of outside nodes, which closes whatever reaches the border.
-
-    Nodes are counted from 0 in the shell; those of the box are 1 .. resolution, and all beyond are outside.
-    """
+    """resolution^3 nodes over the box in a shell of outside nodes, which closes whatever reaches the border. Nodes are counted from
+    0 in the shell; those of the box are 1 .. resolution, and all beyond are outside."""
 
     def __init__(self, sdf: Callable[[Tensor], Tensor], box: float, resolution: int):
         self.sdf, self.box, self.resolution = sdf, box, resolution

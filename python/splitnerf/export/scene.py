@@ -79,11 +79,8 @@ def write_textured(
 def write_delivered(
     run: Path, out: Path, formats: Sequence[str], asset: Asset, occlusion: np.ndarray, placing: Placing
 ) -> Exported:
-    """Writes what :func:`write_assets` writes of the asset and the light that a run's refinement delivered.
-
-    Raises:
-        InputError: The run's mesh.ply cannot be read, or a format needs a package that is not installed.
-    """
+    """Writes what :func:`write_assets` writes of the asset and the light that a run's refinement delivered. Raises InputError where
+    the run's mesh.ply cannot be read, or a format needs a package that is not installed."""
     if "usdz" in formats:
         require_usd()
     origin, scale = write_textured(out, formats, asset, occlusion, placing)
@@ -111,7 +108,9 @@ def write_assets(
     placing: Placing = Placing(),
     ground: np.ndarray | None = None,
 ) -> Exported:
-    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder.
+    """Writes mesh.ply, mesh.glb, mesh.obj, mesh.usdz as requested, environment.exr and environment.hdr into a folder. Raises
+    EmptyMesh where the surface is empty, InputError where a format needs a package that is not installed, and RuntimeError where a
+    field is not finite.
 
     The sizes of grid, mesh and textures are those of the model's settings, group `export`. All files are in the data's
     own world frame, or as `placing` says; the light does not change. GLB, OBJ and USDZ are decimated, textured and y
@@ -122,13 +121,7 @@ def write_assets(
         box_from_world: [4, 4], see :class:`splitnerf.data.dataset.Dataset`.
         formats: Out of :data:`FORMATS`.
         name: What the mesh, its material and its images are called.
-        placing: Where the files have the asset.
         ground: See :class:`splitnerf.data.dataset.Dataset`; the asset ends there.
-
-    Raises:
-        EmptyMesh: The surface is empty.
-        InputError: A format needs a package that is not installed.
-        RuntimeError: A field is not finite.
     """
     c = model.config
     resolution = c.export.resolution

@@ -19,12 +19,9 @@ AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
 
 def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Removes connected components with less than 1 % of the largest one's faces, and the walls of cavities, hollows
-    that nothing outside can see: a wall faces inward, so that the volume that it encloses is negative.
-
-    Returns:
-        vertices [n, 3], outward faces [m, 3] and the number of removed components.
-    """
+    """Removes connected components with less than 1 % of the largest one's faces, and the walls of cavities, hollows that nothing
+    outside can see: a wall faces inward, so that the volume that it encloses is negative. Returns vertices [n, 3], outward faces
+    [m, 3] and the number of removed components."""
     label = connected_component_labels(np.concatenate([faces[:, :2], faces[:, 1:]]), len(vertices))
     count = np.bincount(label[faces[:, 0]], minlength=label.max() + 1)
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
@@ -37,11 +34,8 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
 def drop_unseen(
     vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Removes connected components of whose vertices less than a tenth is `seen` [n], unless all are such.
-
-    Returns:
-        vertices [n, 3], faces [m, 3], `seen` of these vertices, and the number of removed components.
-    """
+    """Removes connected components of whose vertices less than a tenth is `seen` [n], unless all are such. Returns vertices [n, 3],
+    faces [m, 3], `seen` of these vertices, and the number of removed components."""
     label = connected_component_labels(trimesh.geometry.faces_to_edges(faces), len(vertices))
     shown = np.bincount(label, seen) >= LEAST_SEEN * np.bincount(label)
     kept = (shown | ~shown.any())[label]
@@ -49,12 +43,9 @@ def drop_unseen(
 
 
 def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moves the vertices [n, 3] that are not `seen` [n] on to a membrane between those seen: each into the middle of
-    its neighbours. A flat rim gets a flat cap. Without any seen vertex all stay as they are.
-
-    Returns:
-        vertices [n, 3], and [n] bool, those that stay.
-    """
+    """Moves the vertices [n, 3] that are not `seen` [n] on to a membrane between those seen: each into the middle of its
+    neighbours. A flat rim gets a flat cap. Without any seen vertex all stay as they are. Returns vertices [n, 3], and [n] bool,
+    those that stay."""
     n, edges = len(vertices), trimesh.geometry.faces_to_edges(faces)
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
     links = links.maximum(links.T)  # the rim of a mesh that is not closed
@@ -74,14 +65,9 @@ def is_closed(faces: np.ndarray) -> bool:
 
 
 def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Collapses edges by quadric error until about n_faces are left; tries several ways to keep a closed mesh closed. A
-    number of 0, or not below that of the faces, keeps all.
-
-    Returns:
-        vertices [k, 3] float32 and faces [l, 3] int32.
-
-    Source: Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997).
-    """
+    """Collapses edges by quadric error until about n_faces are left: vertices [k, 3] float32 and faces [l, 3] int32. Tries several
+    ways to keep a closed mesh closed. A number of 0, or not below that of the faces, keeps all. Source: Garland and Heckbert,
+    "Surface Simplification Using Quadric Error Metrics" (1997)."""
     vertices, faces = vertices.astype(np.float32), faces.astype(np.int32)
     if n_faces == 0 or n_faces >= len(faces):
         return vertices, faces
@@ -97,10 +83,8 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.
 
 
 def split_pinches(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gives each fan of faces its own copy of a vertex where parts of the surface touch in a vertex or an edge.
-
-    Two faces belong to one fan of a vertex if they share an edge there that no third face shares.
-    """
+    """Gives each fan of faces its own copy of a vertex where parts of the surface touch in a vertex or an edge. Two faces belong to
+    one fan of a vertex if they share an edge there that no third face shares."""
     corners = np.arange(3 * len(faces)).reshape(-1, 3)
     start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()  # corners of each directed edge
     vertex = faces.ravel()

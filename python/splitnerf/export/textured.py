@@ -36,7 +36,9 @@ def textured_asset(
     on_surface: np.ndarray | None = None,
     tell: Callable[[float, str], None] = lambda share, what: None,
 ) -> tuple[Asset, np.ndarray, bool]:
-    """Decimates a mesh, moves its vertices back onto the surface, unwraps it and bakes its textures.
+    """Decimates a mesh, moves its vertices back onto the surface, unwraps it and bakes its textures: the asset in the surface's
+    frame, its occlusion [h, w] in [0, 1], 1 = open, and whether the mesh was closed before the charts cut it. Raises RuntimeError
+    where the texture is too small, or a field is not finite.
 
     Args:
         vertices, faces: The mesh, [n, 3] and [m, 3], in the surface's frame.
@@ -48,13 +50,6 @@ def textured_asset(
         on_surface: [n] bool, the vertices that are of the zero level set. The others, a cap's, stay where they are,
             with the mesh's normals. None: all.
         tell: Called before each part with the share of the time that is used by then, about, and the part's name.
-
-    Returns:
-        The asset in the surface's frame with baked textures, its occlusion [h, w] in [0, 1], 1 = open, and whether the mesh was
-        closed before the charts cut it.
-
-    Raises:
-        RuntimeError: The texture is too small, or a field is not finite.
     """
     reach = 2.0 * spacing
     tell(0.0, "fewer faces")
@@ -93,15 +88,12 @@ def vertex_normals(
 
 
 def unwrap(vertices: np.ndarray, faces: np.ndarray, texture_size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cuts a mesh, vertices [n, 3] float32 and faces [m, 3] int32, into charts and packs them into one square texture
-    of so many texels along an edge, without overlap.
+    """Cuts a mesh, vertices [n, 3] float32 and faces [m, 3] int32, into charts and packs them into one square texture of so many
+    texels along an edge, without overlap. Raises InputError where the machine has one processor.
 
     Returns:
-        origins [k] int64, the vertex that each new one is a copy of; faces [m, 3] int32 of the new vertices; and uv [k,
-        2] float32 in [0, 1], (0, 0) the top left corner.
-
-    Raises:
-        InputError: The machine has one processor.
+        origins [k] int64, the vertex that each new one is a copy of; faces [m, 3] int32 of the new vertices; and uv [k, 2] float32
+        in [0, 1], (0, 0) the top left corner.
     """
     refuse_one_processor()
     atlas = xatlas.Atlas()

@@ -26,12 +26,7 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
 
 def write_glb(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
-    """Writes the file of :func:`glb_content`, atomically.
-
-    Raises:
-        RuntimeError: See :func:`encode_maps`.
-        OSError: The file cannot be written.
-    """
+    """Writes the file of :func:`glb_content` atomically. Raises RuntimeError as that does, and OSError where writing fails."""
     content = glb_content(asset, occlusion, path)
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
@@ -44,8 +39,8 @@ def glb_content(
     *,
     filtering: int | None = None,
 ) -> bytes:
-    """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside, all called by the
-    asset's name: NAME and NAME_basecolor, NAME_orm, NAME_normal.
+    """The bytes of a GLB with one mesh and one metallic-roughness material, y up, textures as PNG inside, all called by the asset's
+    name: NAME and NAME_basecolor, NAME_orm, NAME_normal. Raises RuntimeError, see :func:`encode_maps`.
 
     Occlusion, roughness and metallic share one image, as glTF proposes. Without textures there are the factors alone.
 
@@ -54,9 +49,6 @@ def glb_content(
         occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness-metallic texture; or None.
         path: The name of the file in messages.
         filtering: glTF's number of the textures' filter; None leaves it to the viewer.
-
-    Raises:
-        RuntimeError: See :func:`encode_maps`.
     """
     maps, material = encode_maps(path, asset, occlusion), asset.materials[0]
     images = [None if pixels is None else Image.fromarray(pixels) for pixels in maps]
@@ -113,13 +105,9 @@ def glb_content(
 
 
 def write_obj(path: str | os.PathLike, asset: Asset) -> list[Path]:
-    """Writes NAME.obj, NAME.mtl and NAME_albedo.png, _roughness.png, _metallic.png, _normal.png beside it, y up, and
-    returns the files. The MTL holds the widespread PBR extension: map_Kd (sRGB), map_Pr, map_Pm (linear), norm.
-
-    Raises:
-        RuntimeError: See :func:`encode_maps`.
-        OSError: A file cannot be written.
-    """
+    """Writes NAME.obj, NAME.mtl and NAME_albedo.png, _roughness.png, _metallic.png, _normal.png beside it, y up, and returns the
+    files. The MTL holds the widespread PBR extension: map_Kd (sRGB), map_Pr, map_Pm (linear), norm. Raises RuntimeError, see
+    :func:`encode_maps`, and OSError where a file cannot be written."""
     path = Path(path)
     (albedo, orm, normal), material = encode_maps(path, asset, None), asset.materials[0]
     images = {"map_Kd": ("albedo", albedo), "norm": ("normal", normal)}
@@ -159,14 +147,8 @@ def require_usd() -> None:
 
 
 def write_usdz(path: str | os.PathLike, asset: Asset, occlusion: np.ndarray | None = None) -> None:
-    """Writes one mesh with one UsdPreviewSurface, y up, textures as PNG inside, atomically; arguments as for
-    :func:`glb_content`.
-
-    Raises:
-        InputError: usd-core is not installed.
-        RuntimeError: See :func:`encode_maps`.
-        OSError: The file cannot be written.
-    """
+    """Writes one mesh with one UsdPreviewSurface, y up, textures as PNG inside, atomically; arguments as for :func:`glb_content`.
+    Raises InputError where usd-core is not installed, RuntimeError, see :func:`encode_maps`, and OSError where writing fails."""
     require_usd()
     from pxr import Sdf, Usd, UsdUtils
 
@@ -248,16 +230,8 @@ def _fill(stage: object, asset: Asset, maps: Maps, folder: Path) -> None:
 
 def encode_maps(path: object, asset: Asset, occlusion: np.ndarray | None) -> Maps:
     """The textures of an asset's one material in the encoding of files, [h, w, 3] uint8, None where it has only a factor: albedo in
-    sRGB; occlusion (1 where there is none), roughness, metallic, linear; and (normal + 1) / 2.
-
-    Args:
-        path: The file to be written, for messages.
-        asset: The asset, with uv if it has textures.
-        occlusion: [h, w] occlusion in [0, 1], 1 = open, with the size of the roughness texture; or None.
-
-    Raises:
-        RuntimeError: The asset has several materials, textures without uv, or something is not finite or of wrong size.
-    """
+    sRGB; occlusion (1 where there is none), roughness, metallic, linear; and (normal + 1) / 2. Raises RuntimeError, which names
+    `path`, where there are several materials or textures without uv, or something is not finite or of wrong size."""
     n, material = len(asset.vertices), asset.materials[0]
     if len(asset.materials) != 1:
         raise RuntimeError(f"{path}: has {len(asset.materials)} materials, one is supported")

@@ -38,13 +38,8 @@ TEXEL_PARTS = 4  # parts of a texel along its edge, for its solid angle
 
 
 class LightTexels(NamedTuple):
-    """The environment as a partition of the sphere into texels.
-
-    Attributes:
-        directions: [t, 3] unit, the middle of each texel.
-        solid_angles: [t] sr; they sum to 4 pi.
-        radiance: [t, 3] mean linear radiance of each texel.
-    """
+    """The environment as a partition of the sphere into texels: their middles `directions` [t, 3] unit, `solid_angles` [t] in sr,
+    which sum to 4 pi, and `radiance` [t, 3], the mean linear radiance of each."""
 
     directions: Tensor
     solid_angles: Tensor
@@ -52,12 +47,8 @@ class LightTexels(NamedTuple):
 
 
 class CellLight(NamedTuple):
-    """The environment reduced to k cells of the sphere.
-
-    Attributes:
-        radiance: [k, 3] mean linear radiance of each cell.
-        solid_angles: [k] sr; they sum to 4 pi.
-    """
+    """The environment reduced to k cells of the sphere: `radiance` [k, 3], the linear mean of each, and `solid_angles` [k] in sr,
+    in sum 4 pi."""
 
     radiance: Tensor
     solid_angles: Tensor
@@ -102,11 +93,8 @@ class EvaluatedLight:
         return self.light.partition(at_least, device, self._parts)
 
     def turned(self, turns: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
-        """The light of n points of its own frame each: called as the light is, with directions [m n, 3] of the points' world.
-
-        Args:
-            turns: [n, 3, 3] rotations from the points' world to the light's frame.
-        """
+        """The light of n points of its own frame each: called as the light is, with directions [m n, 3] of the points' world;
+        `turns` [n, 3, 3] are the rotations from there to the light's frame."""
 
         def look_up(directions: Tensor, roughness: Tensor) -> Tensor:
             of_points = directions.view(len(directions) // max(1, len(turns)), len(turns), 3, 1)
@@ -175,14 +163,9 @@ class Light(nn.Module, abc.ABC):
         return self(directions, roughness)
 
     def partition(self, at_least: int, device: torch.device, parts: tuple[Tensor, ...] | None = None) -> LightTexels:
-        """The environment as texels on the light's device: those that the light consists of, or else at least so many,
-        each the light about its middle. The radiance is differentiable; equal calls return the same directions.
-
-        Args:
-            at_least: The fewest texels.
-            device: The light's device.
-            parts: The result of :meth:`parts`; None: it is computed.
-        """
+        """The environment as texels on the light's device: those that the light consists of, or else at least so many, each the
+        light about its middle. The radiance is differentiable; equal calls return the same directions. `parts` is what
+        :meth:`parts` returns; None: it is computed."""
         directions, solid_angles = equirect_texels(math.ceil(math.sqrt(at_least / 2)), device)
         return LightTexels(directions, solid_angles, self(directions, texel_roughness(solid_angles)))
 
@@ -219,10 +202,7 @@ def texel_roughness(solid_angles: Tensor) -> Tensor:
 
 
 def lobe_roughness(solid_angle: float) -> float:
-    """The roughness, at most 1, whose pre-integration lobe has this effective solid angle (sr).
-
-    A narrow lobe with ggx_alpha = a has the solid angle 4 pi a^2.
-    """
+    """The roughness, at most 1, whose pre-integration lobe has this solid angle (sr): 4 pi a^2 if narrow, with ggx_alpha = a."""
     return min((solid_angle / (4.0 * math.pi)) ** 0.25, 1.0)
 
 
@@ -270,23 +250,14 @@ class LightMlp(Light):
 
 
 class PyramidFilters(NamedTuple):
-    """The fixed linear maps of one resolution, shared by all lights of that resolution.
+    """The fixed linear maps of one resolution, shared by all lights of that resolution."""
 
-    Attributes:
-        sum_of_levels: The map from parameters to the texels' log-radiance.
-        averages: The map from texels to the texels followed by their averages.
-        lobes: The map from these averages to the filtered maps.
-        projection: [169, m^2], the map from averages of resolution m to spherical harmonics.
-        projected: The rows of the averages that the projection reads.
-        resolutions, nodes, zonal: The arguments of :func:`splitnerf.ops.light.light_lookup` with these names.
-    """
-
-    sum_of_levels: SparseMap
-    averages: SparseMap
-    lobes: SparseMap
-    projection: Tensor
-    projected: slice
-    resolutions: Tensor
+    sum_of_levels: SparseMap  # from parameters to the texels' log-radiance
+    averages: SparseMap  # from texels to the texels followed by their averages
+    lobes: SparseMap  # from these averages to the filtered maps
+    projection: Tensor  # [169, m^2], from averages of resolution m to spherical harmonics
+    projected: slice  # the rows of the averages that the projection reads
+    resolutions: Tensor  # like nodes and zonal an argument of splitnerf.ops.light.light_lookup
     nodes: Tensor
     zonal: Tensor
 
@@ -305,11 +276,8 @@ def filters_on(resolution: int, device: torch.device) -> PyramidFilters:
 
 @functools.lru_cache(maxsize=2)
 def pyramid_filters(resolution: int) -> PyramidFilters:
-    """The linear maps for ``resolution`` texels along the edge, a power of 2 >= 16; computed once, in double precision.
-
-    Raises:
-        ValueError: The resolution is not a power of 2 or is below 16.
-    """
+    """The linear maps for ``resolution`` texels along the edge, computed once, in double precision. Raises ValueError where that is
+    not a power of 2 or is below 16."""
     if resolution < 16 or resolution & (resolution - 1):
         raise ValueError(f"LightPyramid: resolution must be a power of 2, at least 16, got {resolution}")
     with torch.inference_mode(False):  # a first call in inference mode must not make inference tensors
@@ -331,8 +299,7 @@ def pyramid_filters(resolution: int) -> PyramidFilters:
 
 @functools.lru_cache(maxsize=4)
 def octahedral_texels(resolution: int, device: torch.device) -> tuple[Tensor, Tensor]:
-    """The mean directions [n^2, 3] and the solid angles [n^2] of an octahedral map's texels, row by row, from parts of
-    du dv / |p|^3."""
+    """Mean directions [n^2, 3] and solid angles [n^2] of an octahedral map's texels, row by row, from parts of du dv / |p|^3."""
     with torch.inference_mode(False):
         n = TEXEL_PARTS * resolution
         axis = (torch.arange(n, dtype=torch.float64) + 0.5) * (2.0 / n) - 1.0

@@ -41,26 +41,16 @@ class Occlusion(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Which texels of a light lie in which of k cells.
+    """Which texels of a light lie in which of k cells."""
 
-    Attributes:
-        texels: [t, 3] the texels' directions.
-        cell: [t] int64, the cell of each texel.
-        means: The [k, t] matrix that takes the mean over the texels of each cell, by their solid angles.
-        solid_angles: [k] solid angles of the cells, sr.
-    """
-
-    texels: Tensor
-    cell: Tensor
-    means: SparseMap
-    solid_angles: Tensor
+    texels: Tensor  # [t, 3] the texels' directions
+    cell: Tensor  # [t] int64, the cell of each texel
+    means: SparseMap  # [k, t], takes the mean over the texels of each cell, by their solid angles
+    solid_angles: Tensor  # [k] of the cells, sr
 
 
 class SkyCells(nn.Module):
-    """The sphere as k cells, those of the directions nearest to the points of a Fibonacci sphere.
-
-    Args:
-        n_directions: The number k of cells, a multiple of 32.
+    """The sphere as `n_directions` cells, k, a multiple of 32: those of the directions nearest to the points of a Fibonacci sphere.
 
     Attributes:
         centres: [k, 3] unit; no part of the state_dict.
@@ -115,27 +105,18 @@ class SkyCells(nn.Module):
 
     @property
     def summed_from(self) -> float:
-        """The smallest roughness at which a sum over the k cells resolves the lobe.
-
-        A lobe of ggx_alpha = a effectively contains 3 k a^2 directions (see :func:`splitnerf.ops.visibility.cached_occlusion`).
-        """
+        """The smallest roughness at which a sum over the k cells resolves the lobe. One of ggx_alpha = a effectively contains
+        3 k a^2 directions (see :func:`splitnerf.ops.visibility.cached_occlusion`)."""
         return (LOBE_DIRECTIONS / (3.0 * len(self.centres))) ** 0.25
 
 
 class Emitters(NamedTuple):
-    """The mesh's vertices as they are seen: one row for each vertex and direction in which rays hit it.
+    """The mesh's vertices as they are seen: one row for each vertex and direction in which rays hit it."""
 
-    Attributes:
-        vertices: [p] int64, the vertex.
-        directions: [p] int64, the traced direction that hits it; it is seen from the opposite direction.
-        mirrored: [p] int64, the emitter that the vertex sees in the mirror direction, -1 where that is open.
-        facing: [p, 1] bool, whether it is seen from the outside.
-    """
-
-    vertices: Tensor
-    directions: Tensor
-    mirrored: Tensor
-    facing: Tensor
+    vertices: Tensor  # [p] int64, the vertex
+    directions: Tensor  # [p] int64, the traced direction that hits it; it is seen from the opposite direction
+    mirrored: Tensor  # [p] int64, the emitter that the vertex sees in the mirror direction, -1 where that is open
+    facing: Tensor  # [p, 1] bool, whether it is seen from the outside
 
 
 def emitters_of(cache: VisibilityCache) -> tuple[Tensor, Emitters]:
@@ -198,7 +179,6 @@ class VisibilityBits:
         """The visibility of every vertex of a mesh, traced on the CPU, under a light of 1.
 
         Args:
-            scene: The mesh, ready to be traced.
             vertices, faces: [n, 3], scene units, and [m, 3], on the CPU.
             directions: [k, 3] unit, a direction for each cell.
             offset: The distance of a ray's start from its vertex along the normal, scene units.
@@ -272,10 +252,8 @@ class VisibilityBits:
         return {"sky": self.light, "aims": self.cache.directions, "sent": self.radiance, "emitters": emitters}
 
     def restore(self, stored: dict[str, Tensor | None]) -> None:
-        """Takes back the light of :meth:`state`, on the same mesh traced in the same directions.
-
-        Emitters that are not stored keep the radiance that they have: another machine's rays may hit a few others.
-        """
+        """Takes back the light of :meth:`state`, on the same mesh traced in the same directions. Emitters that are not stored keep
+        the radiance that they have: another machine's rays may hit a few others."""
         self.light.copy_(stored["sky"])
         theirs = stored["emitters"]
         if theirs is None or self.emitters is None:

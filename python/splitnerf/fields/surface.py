@@ -19,13 +19,8 @@ SOFTPLUS_BETA = 100.0
 
 
 class SdfSample(NamedTuple):
-    """The field at a batch of points.
-
-    Attributes:
-        outputs: [n, n_outputs]; the first output is the signed distance (scene units, negative inside).
-        features: [n, C] hash-grid features.
-        gradient: [n, 3] d sdf / d position.
-    """
+    """The field at a batch of points: `outputs` [n, n_outputs], of which the first is the signed distance (scene units, negative
+    inside), `features` [n, C] of the hash grid, and `gradient` [n, 3], d sdf / d position."""
 
     outputs: Tensor
     features: Tensor
@@ -110,10 +105,7 @@ class SdfField(nn.Module):
         )
 
     def sample(self, positions: Tensor) -> SdfSample:
-        """Outputs, grid features and the analytic gradient in one pass.
-
-        Differentiable once in all parameters (not in positions).
-        """
+        """Outputs, grid features and the analytic gradient in one pass, differentiable once in all parameters, not in positions."""
         outputs, features, gradient = sdf_field(
             positions,
             self.grid.table,
@@ -132,14 +124,9 @@ class SdfField(nn.Module):
         return SdfSample(outputs, features, gradient)
 
     def sample_finite_difference(self, positions: Tensor, cells: float = 1.0) -> SdfSample:
-        """The values of :meth:`sample`, with the gradient by central differences (six evaluations).
-
-        Args:
-            positions: [n, 3], scene units.
-            cells: The step eps of the differences, in cells of the finest open level.
-
-        Source: Neuralangelo (Li et al. 2023), section 3.1; SplitNeRF's released code does the same.
-        """
+        """The values of :meth:`sample` at positions [n, 3], scene units, with the gradient by central differences (six evaluations)
+        with a step of so many `cells` of the finest open level. Source: Neuralangelo (Li et al. 2023), section 3.1; SplitNeRF's
+        released code does the same."""
         resolution = self.grid.spec.levels()[max(0, self.grid.n_active - 1)][0]
         eps = cells * 2.0 * self.box / resolution
         axes = torch.eye(3, dtype=positions.dtype, device=positions.device)
@@ -163,13 +150,9 @@ def relu_mlp(n_inputs: int, width: int, n_layers: int, n_outputs: int) -> nn.Seq
 
 
 class MaterialHead(nn.Module):
-    """Predicts albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid.
-
-    Roughness is rescaled to [``min_roughness``, 1]. The bias of metallic starts at -2, since most surfaces are not
-    metal; this choice is ours, the paper does not give one.
-
-    Source: SplitNeRF's material network; width and depth from its supplement.
-    """
+    """Predicts albedo (linear), roughness (perceptual) and metallic of a point, each in [0, 1] by a sigmoid. Roughness is rescaled
+    to [``min_roughness``, 1]. The bias of metallic starts at -2, since most surfaces are not metal; this choice is ours, the paper
+    does not give one. Source: SplitNeRF's material network; width and depth from its supplement."""
 
     def __init__(self, n_inputs: int, width: int, n_layers: int, initial_roughness: float, min_roughness: float):
         super().__init__()
@@ -187,12 +170,8 @@ class MaterialHead(nn.Module):
 
 
 class OcclusionHead(nn.Module):
-    """Predicts the occlusion factors o_d and o_s of a point, 1 = open, from its position alone.
-
-    The output biases start at +2, mostly open; this choice is ours.
-
-    Source: SplitNeRF Eq. (12)-(15).
-    """
+    """Predicts the occlusion factors o_d and o_s of a point, 1 = open, from its position alone (SplitNeRF Eq. (12)-(15)). The
+    output biases start at +2, mostly open; this choice is ours."""
 
     def __init__(self, n_inputs: int, width: int, n_layers: int, n_channels: int):
         super().__init__()

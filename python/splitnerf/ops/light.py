@@ -134,13 +134,9 @@ class SparseMap(NamedTuple):
 
 
 def sparse_map(parts: list[tuple], sides: tuple[list[int], list[int]] | None = None) -> SparseMap:
-    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns).
-
-    Args:
-        parts: The matrices.
-        sides: The edges of the octahedral maps that rows and columns are, one after the other, where the parts hold one
-            row of each four mirror images. None: they hold all rows.
-    """
+    """Stacks matrices of equal width, given as ``_core`` returns them: (offsets, columns, weights, n_columns). `sides`: the edges
+    of the octahedral maps that rows and columns are, where the parts hold one row of each four mirror images; None: they hold all
+    rows."""
     starts = np.cumsum([0] + [len(columns) for _, columns, _, _ in parts])
     offsets = np.concatenate([[0]] + [part[0][1:] + start for part, start in zip(parts, starts)])
     columns, weights = (np.concatenate([part[k] for part in parts]) for k in (1, 2))

@@ -99,10 +99,8 @@ def hash_encode(
 
 
 def rounded(table: Tensor) -> Tensor:
-    """The table in float16, rounded to nearest even.
-
-    A value beyond the largest number, 65504, becomes that number, never infinite. NaN stays NaN.
-    """
+    """The table in float16, rounded to nearest even. A value beyond the largest number, 65504, becomes that number, never infinite.
+    NaN stays NaN."""
     largest = torch.finfo(torch.float16).max
     return table.detach().clamp(-largest, largest).half()
 

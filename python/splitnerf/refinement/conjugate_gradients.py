@@ -15,14 +15,8 @@ EXACT = 1e-7  # share of the right side: a smaller residual is rounding
 def conjugate_gradients(
     product: Callable[[Tensor], Tensor], precondition: Callable[[Tensor], Tensor], right: Tensor, n_iterations: int
 ) -> Tensor:
-    """An approximate solution x of A x = right, of the shape of `right`, by scipy.
-
-    Args:
-        product: x -> A x, A symmetric and positive definite.
-        precondition: x -> M x, M symmetric, positive definite and near the inverse of A.
-        right: The right side, on the CPU.
-        n_iterations: The most products.
-    """
+    """An approximate solution x of A x = right, on the CPU, of the shape of `right`, by scipy with at most `n_iterations` products.
+    `product` is x -> A x, A symmetric and positive definite; `precondition` is x -> M x, M likewise and near the inverse of A."""
     b = right.numpy().ravel()
 
     def operator(function: Callable[[Tensor], Tensor]) -> LinearOperator:

@@ -21,27 +21,16 @@ BESIDE = 0.02  # pixels from a piece to the point at which a ray checks that the
 
 
 class Edges(NamedTuple):
-    """The edges of a mesh that two triangles share, k of them.
+    """The edges of a mesh that two triangles share, k of them."""
 
-    Attributes:
-        ends: [k, 2] vertices.
-        triangles: [k, 2] the two triangles at each.
-        opposite: [k, 2] the third vertex of each triangle.
-    """
-
-    ends: np.ndarray
-    triangles: np.ndarray
-    opposite: np.ndarray
+    ends: np.ndarray  # [k, 2] vertices
+    triangles: np.ndarray  # [k, 2] the two triangles at each
+    opposite: np.ndarray  # [k, 2] the third vertex of each triangle
 
 
 class Mesh:
-    """A mesh whose outline is computed.
-
-    Args:
-        vertices: [m, 3] world, each place once.
-        faces: [t, 3] int64, each with three corners that differ.
-        edges: Those of the faces, from :func:`edges_of`.
-    """
+    """A mesh whose outline is computed: `vertices` [m, 3] world, each place once; `faces` [t, 3] int64, each with three corners
+    that differ; and their `edges`, from :func:`edges_of`."""
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray, edges: Edges):
         self.vertices, self.edges = vertices, edges
@@ -52,19 +41,12 @@ class Mesh:
 
 
 class Pieces(NamedTuple):
-    """Short pieces of the outline in one photo, n of them.
+    """Short pieces of the outline in one photo, n of them."""
 
-    Attributes:
-        points: [n, 2] their middles in the image, in pixels.
-        lengths: [n] in pixels.
-        ends: [n, 2] the vertices that move a piece.
-        moves: [n, 2, 3] how far a piece moves outward, in pixels, as each of them moves by a unit along each axis.
-    """
-
-    points: np.ndarray
-    lengths: np.ndarray
-    ends: np.ndarray
-    moves: np.ndarray
+    points: np.ndarray  # [n, 2] their middles in the image, in pixels
+    lengths: np.ndarray  # [n] in pixels
+    ends: np.ndarray  # [n, 2] the vertices that move a piece
+    moves: np.ndarray  # [n, 2, 3] pixels that a piece moves outward per unit move of either vertex along each axis
 
 
 def edges_of(triangles: np.ndarray) -> Edges:
@@ -130,12 +112,8 @@ def outline_pieces(mesh: Mesh, pixels: Pixels, view: int, shape: tuple[int, int]
 
 
 def coverage_slopes(pieces: Pieces, number: np.ndarray, n_vertices: int, window: PixelFilter) -> csr_matrix:
-    """The derivatives [pixels, 3 m] of the coverage of a photo's pixels by the coordinates of `n_vertices` m.
-
-    Args:
-        pieces: The outline in the photo.
-        number: [H, W] int64 the row of each pixel, -1 where there is none; the rows are 0 to number.max().
-    """
+    """The derivatives [pixels, 3 m] of the coverage of a photo's pixels by the coordinates of `n_vertices` m, from the outline in
+    the photo. `number` [H, W] int64 is the row of each pixel, -1 where there is none; the rows are 0 to number.max()."""
     height, width = number.shape
     around = np.arange(window.WIDTH) - window.WIDTH // 2  # from its own pixel to those whose windows hold a piece
     column, row = (np.floor(pieces.points[:, i, None]).astype(np.int64) + around for i in range(2))

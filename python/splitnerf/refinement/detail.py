@@ -110,18 +110,9 @@ class Windows:
 
 
 class FineTexels:
-    """The covered texels of a finer texture, m of them, with what the fit knows there.
-
-    Args:
-        asset: The asset, with one material and its textures.
-        light: [h, 2 h, 3] linear radiance.
-        size: Texels along the edge.
-
-    Attributes:
-        albedo, metallic: [m, 3] and [m, 1] of the fit.
-        scattered: [m, 3] the linear radiance that a diffuse surface of that albedo scatters.
-        windows: Of twice WINDOW texels of the fit.
-    """
+    """The covered texels of a finer texture of `size` texels along an edge, m of them, with what the fit knows there: `albedo`
+    [m, 3], `metallic` [m, 1], `scattered` [m, 3], the linear radiance that a diffuse surface of that albedo scatters in the light
+    [h, 2 h, 3], and `windows` of twice WINDOW texels of the fit."""
 
     def __init__(self, asset: Asset, light: Tensor, size: int):
         m, covered = asset.materials[0], rasterise(asset.uv, asset.triangles, size)

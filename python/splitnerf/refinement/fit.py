@@ -93,41 +93,25 @@ class FitSettings:
 
 
 class Shaded(NamedTuple):
-    """Radiance of n points towards the viewer, from k directions of the light.
+    """Radiance of n points towards the viewer, from k directions of the light."""
 
-    Attributes:
-        colours: [n, 3] linear radiance.
-        radiance: [n, k, 3] light that arrives, a leaf of the graph.
-        visible: [n, k] 1 where the environment is seen, 0 where the asset blocks it.
-        texels, shares: [n k, 4] where the environment is read.
-        sky: [n, k, 3] radiance of the environment.
-    """
-
-    colours: Tensor
-    radiance: Tensor
-    visible: Tensor
-    texels: Tensor
+    colours: Tensor  # [n, 3] linear radiance
+    radiance: Tensor  # [n, k, 3] light that arrives, a leaf of the graph
+    visible: Tensor  # [n, k] 1 where the environment is seen, 0 where the asset blocks it
+    texels: Tensor  # [n k, 4] like shares: where the environment is read
     shares: Tensor
-    sky: Tensor
+    sky: Tensor  # [n, k, 3] radiance of the environment
 
 
 class Observed(NamedTuple):
-    """b pixels of photos, each seen by two rays.
+    """b pixels of photos, each seen by two rays."""
 
-    Attributes:
-        texels, shares: [2 b, 4] where the rays' points read the textures.
-        unknowns: [2 b, 7] a leaf of the graph.
-        shaded: The light that the points send.
-        weights: [b, 3] of the squared errors.
-        errors: [b, 2, 3] of the rays' colours.
-    """
-
-    texels: Tensor
+    texels: Tensor  # [2 b, 4] like shares: where the rays' points read the textures
     shares: Tensor
-    unknowns: Tensor
-    shaded: Shaded
-    weights: Tensor
-    errors: Tensor
+    unknowns: Tensor  # [2 b, 7] a leaf of the graph
+    shaded: Shaded  # the light that the points send
+    weights: Tensor  # [b, 3] of the squared errors
+    errors: Tensor  # [b, 2, 3] of the rays' colours
 
     def squared(self) -> Tensor:
         """[b] squared errors without noise, in expectation."""
@@ -243,11 +227,8 @@ class Refinement:
         }
 
     def restore(self, state: dict[str, object]) -> None:
-        """Restores what :meth:`state` returned for a fit with the same arguments.
-
-        Raises:
-            ValueError, KeyError, TypeError: The state belongs to another fit.
-        """
+        """Restores what :meth:`state` returned for a fit with the same arguments. Raises ValueError, KeyError or TypeError where
+        the state belongs to another fit."""
         self.begin_at(float(state["level"]), float(state["lamp_gain"]))
         sums = {"unknowns": self.unknowns, "curvature": self.equations.curvature, "gradient": self.equations.gradient}
         for name, tensor in sums.items():
@@ -290,11 +271,9 @@ class Refinement:
         turns: Tensor | None = None,
         seed: int = 0,
     ) -> Shaded:
-        """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives.
-
-        The estimate is unbiased, except for the clamp and the last bounce of interreflection. With `turns`, the rotations
-        [n, 3, 3] of directions into the light's frame, light that was reflected comes from that of the first point.
-        """
+        """The light that n points send to the viewer, differentiable in unknowns [n, 7] and the light that arrives. The estimate is
+        unbiased, except for the clamp and the last bounce of interreflection. With `turns`, the rotations [n, 3, 3] of directions
+        into the light's frame, light that was reflected comes from that of the first point."""
         s, m = self.settings, materials_of(to_values(unknowns), samples)
         light = self.light.radiance()
         around = light if turns is None else torch.from_numpy(turn_environment(light.numpy(), turns[0].numpy()))
@@ -369,14 +348,9 @@ class Refinement:
         return max(1, round(min(s.sweep_share * len(self.pixels), SWEEP_PIXELS) / s.pixels))
 
     def sweep(self, seconds: float = math.inf, report: Callable[[], None] = lambda: None) -> tuple[float, np.ndarray]:
-        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error before it, and those of held-out pixels
-        after it, see :meth:`held_errors`.
-
-        Args:
-            seconds: After which no further batch is gathered, LEAST_BATCHES aside; the step counts as long as the last
-                one.
-            report: Called after each batch.
-        """
+        """Gathers a share of all pixels, SWEEP_PIXELS at most, and takes one step; returns the error before it, and those of
+        held-out pixels after it, see :meth:`held_errors`. After `seconds` no further batch is gathered, LEAST_BATCHES aside; the
+        step counts as long as the last one. `report` is called after each batch."""
         s, surface, started = self.settings, self.surface(), time.monotonic()
         n_batches = self.batches_of_a_sweep()
         errors: list[float] = []
@@ -422,14 +396,8 @@ class Refinement:
 
 
 class Draws:
-    """Draws batches of some pixels, with equal chances; with turns, each batch of photos whose lights have about one
-    rotation.
-
-    Args:
-        numbers: [m] the pixels.
-        view: [n] the photo of each pixel, of all pixels.
-        turns: [views, 3, 3] rotations, or None.
-    """
+    """Draws batches of the pixels `numbers` [m] with equal chances, `view` [n] being the photo of each of all pixels; with turns
+    [views, 3, 3], each batch of photos whose lights have about one rotation."""
 
     def __init__(self, numbers: np.ndarray, view: np.ndarray, turns: np.ndarray | None):
         self.numbers = numbers
@@ -445,12 +413,8 @@ class Draws:
 
 
 def groups_of(turns: np.ndarray, view: np.ndarray) -> list[np.ndarray]:
-    """The pixels' numbers in groups of photos whose lights have about one rotation.
-
-    Args:
-        turns: [views, 3, 3] rotations.
-        view: [n] the pixels' photos.
-    """
+    """The pixels' numbers in groups of photos whose lights have about one of the rotations [views, 3, 3]; `view` [n]: their
+    photos."""
     middles = turns[spread(range(len(turns)), MOST_GROUPS)]
     for _ in range(GROUP_ROUNDS):  # k-means of rotations
         group = np.einsum("vij,kij->vk", turns, middles).argmax(axis=1)

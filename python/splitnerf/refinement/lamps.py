@@ -63,19 +63,12 @@ DARK = 0.02  # share of the mean light that counts as none
 
 
 class Lobe(NamedTuple):
-    """The light around the brightest lamp of a map.
+    """The light around the brightest lamp of a map."""
 
-    Attributes:
-        direction: [3] its middle.
-        radiance: [h, 2 h, 3] its light; the map less this is the light behind it.
-        power: [3] the radiance times the solid angle.
-        sharp: Whether half the power is within SHARP degrees.
-    """
-
-    direction: np.ndarray
-    radiance: np.ndarray
-    power: np.ndarray
-    sharp: bool
+    direction: np.ndarray  # [3] its middle
+    radiance: np.ndarray  # [h, 2 h, 3] its light; the map less this is the light behind it
+    power: np.ndarray  # [3] the radiance times the solid angle
+    sharp: bool  # whether half the power is within SHARP degrees
 
 
 class CompactLamp(NamedTuple):
@@ -201,16 +194,8 @@ def at_edges(points: Points, lobe: Lobe, seed: int) -> Points:
 
 
 class Contrasts:
-    """The contrasts of pairs' log albedo, and what lamps in the place of a lobe leave of them.
-
-    Args:
-        points: The pairs.
-        light: [h, 2 h, 3] linear radiance.
-        lobe: The lobe in it.
-
-    Attributes:
-        costs: [k] of the contrasts as they are.
-    """
+    """The contrasts of pairs' log albedo in a light [h, 2 h, 3] of linear radiance, and what lamps in the place of a lobe in it
+    leave of them; `costs` [k] are those of the contrasts as they are."""
 
     def __init__(self, points: Points, light: np.ndarray, lobe: Lobe):
         self._contrast = np.clip(points.albedo[0::2] - points.albedo[1::2], -LARGEST_CONTRAST, LARGEST_CONTRAST)
@@ -265,7 +250,8 @@ def best_lamp(contrasts: Contrasts, middles: np.ndarray, radii: tuple[float, ...
 def compact_lamp(
     texels: AssetTexels, light: np.ndarray, patch: int, seed: int, *, rest_is_known: bool = False
 ) -> tuple[np.ndarray, CompactLamp | None]:
-    """The light with its brightest lobe made compact, if mirror images or the albedo indicate a lamp.
+    """The light with its brightest lobe made compact, if mirror images or the albedo indicate a lamp; and what was found: None
+    where the lobe stays as it is.
 
     Args:
         texels: The asset that was trained with the light.
@@ -273,9 +259,6 @@ def compact_lamp(
         patch: The width of two pixels of the photos in texels.
         seed: Of the choice of pairs.
         rest_is_known: Whether the level of the light beside the lobe is known.
-
-    Returns:
-        The light, and what was found: None where the lobe stays as it is.
     """
     lobe = brightest_lobe(light)
     if not lobe.radiance.any():
@@ -320,11 +303,9 @@ def lamp_near(lobe: Lobe, contrasts: Contrasts) -> CompactLamp | None:
 def with_lamp(
     light: np.ndarray, lobe: Lobe, lamp: CompactLamp, *, rest_is_known: bool = False, mirrored: bool = False
 ) -> np.ndarray:
-    """A map [h, 2 h, 3] with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a lobe.
-
-    Unless the rest is known, all light keeps its colour, as far as MOST_TINT allows: training finds that of a lamp, and takes the rest for greyer
-    than it is. The rest keeps its power where it is known or was mirrored, else all light does.
-    """
+    """A map [h, 2 h, 3] with a lamp, at least LEAST_RADIUS and one texel wide, in the place of a lobe. Unless the rest is known,
+    all light keeps its colour, as far as MOST_TINT allows: training finds that of a lamp, and takes the rest for greyer than it is.
+    The rest keeps its power where it is known or was mirrored, else all light does."""
     directions, areas = directions_of_texels(light.shape[0])
     away = degrees_from(directions, np.array(lamp.direction))
     inside = away <= max(lamp.radius, LEAST_RADIUS, away.min())

@@ -28,11 +28,8 @@ FAINT, ONE_COLOUR, LEAST_GREY = 0.45, 0.1, 0.2
 
 
 def level_of_light(values: Tensor) -> float:
-    """The factor by which the light is too dark; 1 where it is not, or where too few texels agree on it.
-
-    Args:
-        values: [m, 8] texture values: albedo (3), roughness, metallic, normal (3).
-    """
+    """The factor by which the light is too dark; 1 where it is not, or where too few texels agree on it. `values` [m, 8] are those
+    of the texture: albedo (3), roughness, metallic, normal (3)."""
     found = (_reflectance(values)[_dielectric(values)] / DIELECTRIC).log().sort().values
     if len(found) == 0:
         return 1.0
@@ -43,11 +40,8 @@ def level_of_light(values: Tensor) -> float:
 
 
 def tint_of_light(values: Tensor) -> Tensor:
-    """[3] the factors on the light's colours, of geometric mean 1, with which metal of a faint colour is grey; 1 where too few texels agree on one.
-
-    Args:
-        values: [m, 8] texture values, as of :func:`level_of_light`.
-    """
+    """[3] the factors on the light's colours, of geometric mean 1, with which metal of a faint colour is grey; 1 where too few
+    texels agree on one. `values` [m, 8] as of :func:`level_of_light`."""
     logs = values[values[:, 4] > METAL, :3].clamp(min=1e-3).log()
     colours = (logs - logs.mean(1, keepdim=True))[logs.amax(1) - logs.amin(1) < FAINT]
     if len(colours) == 0:
@@ -64,11 +58,9 @@ def rest_level(level: float, lamp_gain: float) -> float:
 
 
 def at_level(values: Tensor, level: float, lamp_gain: float = 1.0) -> Tensor:
-    """The texture values [m, 8] that look the same under a light of that level, of which a lamp adds a factor `lamp_gain` of all power.
-
-    What scatters becomes darker by both, metals, which mirror the rest of the light, by the rest's level. Where a level was found, what is
-    glossy and reflects less than a metal becomes a dielectric.
-    """
+    """The texture values [m, 8] that look the same under a light of that level, of which a lamp adds a factor `lamp_gain` of all
+    power. What scatters becomes darker by both, metals, which mirror the rest of the light, by the rest's level. Where a level was
+    found, what is glossy and reflects less than a metal becomes a dielectric."""
     albedo, metallic = values[:, :3], values[:, 4:5]
     faint = _dielectric(values)[:, None] if level > 1.0 else torch.zeros_like(metallic, dtype=torch.bool)
     albedo = albedo * torch.where(faint, (1 - metallic) / lamp_gain, metallic + (1 - metallic) / lamp_gain)

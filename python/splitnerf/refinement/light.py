@@ -14,11 +14,8 @@ LOG_LIMIT = 12.0
 
 
 class EnvironmentLight:
-    """An equirectangular map whose log radiance is a sum of levels, each twice as fine as the one before.
-
-    Args:
-        radiance: [h, 2 h, 3] linear radiance to start from, h = 8 * 2^k.
-    """
+    """An equirectangular map whose log radiance is a sum of levels, each twice as fine as the one before; it starts from linear
+    `radiance` [h, 2 h, 3], h = 8 * 2^k."""
 
     def __init__(self, radiance: Tensor):
         self.set_radiance(radiance)

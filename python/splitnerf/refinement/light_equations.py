@@ -73,12 +73,8 @@ class LightEquations:
         self.n_batches, self.rows = 0, []
 
     def add(self, rows: Rows, sky: Tensor, residual: Tensor) -> None:
-        """Adds a batch of n rays.
-
-        Args:
-            sky: [n, k, 3] the light's radiance in their directions.
-            residual: [n, 3] predicted minus observed colours, their noise independent of the slopes'.
-        """
+        """Adds a batch of n rays: `sky` [n, k, 3] is the light's radiance in their directions, `residual` [n, 3] are predicted
+        minus observed colours, their noise independent of the slopes'."""
         texels, shares, slopes, weights = rows
         back = slopes * (weights * residual / len(slopes))[:, None]
         self.gradient += read_adjoint(back.reshape(-1, 3), texels, shares, self._n_texels)
@@ -157,8 +153,7 @@ class LightEquations:
         return away, WEIGHT_SEEN * known / (SEEN**2 + away.square() / TAILS)
 
     def _diagonal(self, curvature: Callable[[Tensor], Tensor]) -> Tensor:
-        """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad
-        2007."""
+        """An estimate of the curvature's diagonal, smoothed over neighbours. Source: Bekas, Kokiopoulou and Saad 2007."""
         random, total = torch.Generator().manual_seed(0), torch.zeros(sum(self._sizes))
         for _ in range(N_PROBES):
             signs = torch.randint(0, 2, total.shape, generator=random).float() * 2 - 1
@@ -178,8 +173,7 @@ def seen_texels(height: int, surroundings: np.ndarray) -> tuple[Tensor, Tensor]:
 
 
 def parts_of(level: Tensor, number: int) -> tuple[Tensor, Tensor]:
-    """Deviations of a level [3, h, w] in brightness [1, h, w] and in colour [3, h, w]; of the coarsest from its
-    mean."""
+    """Deviations of a level [3, h, w] in brightness [1, h, w] and colour [3, h, w]; of the coarsest from its mean."""
     if number == 0:
         level = level - level.mean((1, 2), keepdim=True)
     mean = level.mean(0, keepdim=True)

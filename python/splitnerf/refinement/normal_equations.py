@@ -85,11 +85,8 @@ class NormalEquations:
 
     @torch.no_grad()
     def step(self, unknowns: Tensor, usual: Tensor | None, n_iterations: int = 20) -> Tensor:
-        """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares.
-        `usual` [m] is the roughness that texels are drawn to; None: to none.
-
-        Source: Nocedal and Wright 2006, section 10.3.
-        """
+        """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares (Nocedal and
+        Wright 2006, section 10.3). `usual` [m] is the roughness that texels are drawn to; None: to none."""
         prior = self.prior
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown
         flat = prior.flatness(unknowns) * typical

@@ -58,14 +58,10 @@ def outline_pixels(dataset: Dataset) -> tuple[Pixels, np.ndarray]:
 
 
 def by_colours(photo: np.ndarray, behind: np.ndarray, exposure: np.ndarray) -> np.ndarray:
-    """[H, W] the object's coverage of a photo's pixels: its mask's and, where the background is known, that by which the pixel mixes, in
-    linear light, the object's colour farther inside and the background's; each counts by the square of its error.
-
-    Args:
-        photo: [H, W, 4] sRGB at the common exposure, and the mask.
-        behind: [H, W, 4] See :meth:`splitnerf.data.dataset.Dataset.behind`.
-        exposure: [3] the photo's.
-    """
+    """[H, W] the object's coverage of the pixels of a photo [H, W, 4] (sRGB at the common exposure, and the mask): that of the mask
+    and, where the background is known, that by which the pixel mixes, in linear light, the object's colour farther inside and the
+    background's; each counts by the square of its error. For `behind` see :meth:`splitnerf.data.dataset.Dataset.behind`; `exposure`
+    [3] is the photo's."""
     colour, mask = photo[..., :3], photo[..., 3]
     core = distance_transform_edt(mask > 0.5) > INNER
     if not core.any():
@@ -107,12 +103,8 @@ def coverage(scene: MeshScene, pixels: Pixels, generator: np.random.Generator) -
 
 
 def slopes(mesh: Mesh, pixels: Pixels, shape: tuple[int, int]) -> csr_matrix:
-    """The derivatives [n, 3 m] of the coverage of n pixels by the coordinates of m vertices.
-
-    Args:
-        pixels: In the order of their photos.
-        shape: Height and width of a photo.
-    """
+    """The derivatives [n, 3 m] of the coverage of n pixels, in the order of their photos of height and width `shape`, by the
+    coordinates of m vertices."""
     window, parts = PixelFilter(), []
     column, row = pixels.centre.astype(np.int64).T
     for view in np.unique(pixels.view):
@@ -141,7 +133,6 @@ def fit_outline(
     Args:
         dataset: The photos, whose alpha is the mask.
         asset: A closed asset in the photos' world frame.
-        seed: The seed of the rays.
         begins: Called before each round with its number, 0 to ROUNDS - 1; returns whether to make it.
 
     Returns:

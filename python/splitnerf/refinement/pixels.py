@@ -65,12 +65,8 @@ class Pixels:
 
 
 def pixels_of(dataset: Dataset, choose: Callable[[int], np.ndarray], most: int) -> Pixels:
-    """Pixels of a split, photo by photo.
-
-    Args:
-        choose: Returns the pixels [H, W] bool to take from the photo of a number.
-        most: The number of pixels, about, beyond which a random share of them is taken: a pixel takes 43 bytes.
-    """
+    """Pixels of a split, photo by photo: those [H, W] bool that `choose` returns for the number of a photo, or a random share where
+    there are more than about `most`: a pixel takes 43 bytes."""
     chosen, count = [], 0
     for i in range(len(dataset)):
         mask = choose(i)
@@ -144,10 +140,8 @@ class PixelFilter:
         return self._at(generator.random((n, 2)))
 
     def spread(self, n: int, n_rays: int, generator: np.random.Generator) -> np.ndarray:
-        """[n, n_rays, 2] float32 offsets, those of a pixel a lattice with a random shift: for means with little noise.
-
-        Source: Cranley and Patterson 1976; Roberts 2018 (the lattice).
-        """
+        """[n, n_rays, 2] float32 offsets, those of a pixel a lattice with a random shift: for means with little noise. Source:
+        Cranley and Patterson 1976; Roberts 2018 (the lattice)."""
         lattice = np.arange(n_rays)[:, None] * [0.7548776662466927, 0.5698402909980532]
         return self._at((lattice + generator.random((n, 1, 2))) % 1.0)
 

@@ -41,11 +41,8 @@ def fitting_height(height: int) -> int:
 
 
 def read_light(folder: Path) -> np.ndarray:
-    """[h, 2 h, 3] the light in the folder of an asset, averaged down to a height that can be fitted.
-
-    Raises:
-        InputError: There is none, or it cannot be used.
-    """
+    """[h, 2 h, 3] the light in the folder of an asset, averaged down to a height that can be fitted. Raises InputError where there
+    is none, or it cannot be used."""
     path = folder / "environment.exr"
     light = read_environment(path)
     height = fitting_height(light.shape[0])
@@ -73,12 +70,8 @@ class OtherState(InputError):
 
 
 class StateFile:
-    """The state of an unfinished refinement, in a file that is deleted at its end.
-
-    Args:
-        folder: The folder of the results.
-        origin: The hash that identifies the refinement, see :func:`origin_of`.
-    """
+    """The state of an unfinished refinement, in a file in the folder of the results that is deleted at its end; `origin` is the
+    hash that identifies the refinement, see :func:`origin_of`."""
 
     def __init__(self, folder: Path, origin: str):
         self.path, self.origin = folder / STATE, origin
@@ -86,11 +79,7 @@ class StateFile:
         self.content: dict[str, object] = {}
 
     def load(self) -> dict | None:
-        """The state; None where there is no file.
-
-        Raises:
-            OtherState: The file cannot be read, or is another refinement's.
-        """
+        """The state; None where there is no file. Raises OtherState where it cannot be read, or is another refinement's."""
         if not self.path.is_file():
             return None
         try:
@@ -124,8 +113,10 @@ def origin_of(source: Path, dataset: Dataset, settings: FitSettings) -> str:
 def refine_folder(
     source: Path, dataset: Dataset, out: Path, settings: FitSettings, *, resume: bool = False, save_minutes: float = 2.0
 ) -> Refined | None:
-    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it and keeps the state before the
-    sweep. While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt.
+    """Fits the asset and the light of a folder to photos, with a bar; Ctrl-C ends it, keeps the state before the sweep and returns
+    None. While the first sweep is prepared there is nothing to keep: Ctrl-C raises KeyboardInterrupt. Raises InputError where the
+    asset, the light, the photos or the state cannot be used, and RuntimeError where numbers are no longer finite; no result was
+    written then. Raises OSError where a file cannot be written.
 
     Args:
         source: The folder of mesh.glb and environment.exr.
@@ -133,14 +124,6 @@ def refine_folder(
             an unfinished refinement stands there; the caller deletes it (:func:`forget_state`) once all is done.
         resume: Whether to continue from that state, if there is one.
         save_minutes: The time between two saves of the state.
-
-    Returns:
-        The result; None where it was interrupted.
-
-    Raises:
-        InputError: The asset, the light, the photos or the state cannot be used; no result was written.
-        RuntimeError: Numbers are no longer finite; no result was written.
-        OSError: A file cannot be written.
     """
     asset, light = read_source(source)
     out.mkdir(parents=True, exist_ok=True)

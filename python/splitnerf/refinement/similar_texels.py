@@ -16,12 +16,8 @@ REACH = 0.15  # deviation of the colours that count as one
 
 
 class SimilarTexels:
-    """Texels of about one colour at the start of a fit, and the roughness that is usual among them.
-
-    Args:
-        start: [m, n] the unknowns before all steps, see :mod:`splitnerf.refinement.unknowns`.
-        seed: The seed of the texels by which kinds and medians are found.
-    """
+    """Texels of about one colour at the start of a fit, and the roughness that is usual among them. `start` [m, n] are the unknowns
+    before all steps, see :mod:`splitnerf.refinement.unknowns`; `seed` is of the texels by which kinds and medians are found."""
 
     def __init__(self, start: Tensor, seed: int):
         random, colours = np.random.default_rng(seed), start[:, :3].double().numpy() / REACH

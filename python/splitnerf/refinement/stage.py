@@ -35,7 +35,6 @@ class Refined:
     """The result of a refinement.
 
     Attributes:
-        asset: The asset.
         light: [h, 2 h, 3] linear radiance.
         outline: Mean squared errors of the coverage at the outline, before each round and at the end; empty where the
             shape was kept.
@@ -63,20 +62,12 @@ class Refined:
 
 
 class Sweep(NamedTuple):
-    """The report of one sweep.
+    """The report of one sweep; errors are in sRGB units at the tone of the brightest pixel around."""
 
-    Attributes:
-        number: Sweeps so far.
-        seconds: Time since the start.
-        error: Mean squared error of the photos before the sweep's step, without the noise, in sRGB units at the tone of
-            the brightest pixel around; it may come out slightly negative.
-        held: Mean squared error of held-out pixels after it.
-    """
-
-    number: int
-    seconds: float
-    error: float
-    held: float
+    number: int  # sweeps so far
+    seconds: float  # since the start
+    error: float  # mean squared error of the photos before its step, without the noise; perhaps slightly negative
+    held: float  # mean squared error of held-out pixels after it
 
 
 class Candidate(NamedTuple):
@@ -95,7 +86,9 @@ def decibels(error: float) -> float:
 
 
 class Stage:
-    """A refinement, sweep by sweep, with a state from which another process can continue.
+    """A refinement, sweep by sweep, with a state from which another process can continue. Raises InputError where the photos show
+    nothing, and ValueError, KeyError or TypeError where the asset or the light has another form, or the state belongs to another
+    refinement.
 
     An eighth of the photos is not fitted. PATIENCE sweeps after the one that left these photos the smallest error the fit
     ends. The texels and the light after the last sweep are delivered, unless that one, or the start, is clearly better;
@@ -114,11 +107,6 @@ class Stage:
 
     Attributes:
         outline, sweeps, lamp: See :class:`Refined`.
-
-    Raises:
-        ValueError, KeyError, TypeError: The asset or the light has another form, or the state belongs to another
-            refinement.
-        InputError: The photos show nothing.
     """
 
     def __init__(
@@ -162,11 +150,9 @@ class Stage:
 
     @property
     def unseen(self) -> float:
-        """The factor by which errors of held-out pixels would be larger at the start had training not fitted them, too.
-
-        The mean of n noisy values has 1 - 1/n of their variance to those values and 1 + 1/n to others. Training is smoother:
-        it counts as the mean of twice the sightings.
-        """
+        """The factor by which errors of held-out pixels would be larger at the start had training not fitted them, too. The mean of
+        n noisy values has 1 - 1/n of their variance to those values and 1 + 1/n to others. Training is smoother: it counts as the
+        mean of twice the sightings."""
         return 1.0 + 1.0 / max(self.fit.sightings, 1.0)
 
     def _candidate(self, number: int, held: np.ndarray) -> Candidate:

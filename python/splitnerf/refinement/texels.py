@@ -28,15 +28,10 @@ N_CHANNELS = 8  # albedo 3, roughness, metallic, tangent-space normal 3
 
 
 class Footprints(NamedTuple):
-    """Where points read the texture.
+    """Where points read the texture."""
 
-    Attributes:
-        texels: [n, 4] int64 row * size + column.
-        weights: [n, 4] float32 bilinear.
-    """
-
-    texels: Tensor
-    weights: Tensor
+    texels: Tensor  # [n, 4] int64 row * size + column
+    weights: Tensor  # [n, 4] float32 bilinear
 
 
 class SurfaceSamples(NamedTuple):
@@ -71,14 +66,9 @@ def bilinear_footprints(uv: np.ndarray, size: int) -> Footprints:
 
 
 class TexelPairs:
-    """Pairs of neighbours among m texels, with the differences of their values as a linear map.
-
-    Args:
-        m: The number of texels.
-        pairs: [k, 2] the texels of each pair.
-        frames: [q, 2, 2] of the last q pairs what takes x and y of a tangent-space normal at the second into the frame of the first; those
-            of the others have one frame.
-    """
+    """Pairs of neighbours among m texels, [k, 2], with the differences of their values as a linear map. `frames` [q, 2, 2] of the
+    last q pairs take x and y of a tangent-space normal at the second into the frame of the first; the two texels of other pairs
+    have one frame."""
 
     def __init__(self, m: int, pairs: np.ndarray, frames: Tensor):
         k = len(pairs)
@@ -108,11 +98,9 @@ class TexelPairs:
 
 
 class AssetTexels:
-    """The covered texels of an asset's textures, m of them, and the mesh that they lie on.
-
-    Args:
-        asset: An asset with one material and square albedo, roughness-metallic and normal textures of one size; the
-            material's factors must be 1.
+    """The covered texels of an asset's textures, m of them, and the mesh that they lie on. The asset has one material with factors
+    of 1, square albedo, roughness-metallic and normal textures of one size, and no vertex colours or emission; raises ValueError
+    where it has another form.
 
     Attributes:
         index: [m] int64 row * size + column, ascending.
@@ -120,9 +108,6 @@ class AssetTexels:
         positions: [m, 3] the texels' points on the mesh.
         start: [m, 8] the texture's values.
         pairs: Neighbours within a chart, and then the nearest texels of two charts along their seams.
-
-    Raises:
-        ValueError: The asset has another form.
     """
 
     def __init__(self, asset: Asset):
@@ -238,13 +223,8 @@ def neighbours(covered: Texels, chart: np.ndarray, size: int, apart: int = 1) ->
 
 
 def across_seams(inside: np.ndarray, chart: np.ndarray, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """[k, 2] pairs of texels of different charts, each at the border of its own and the other the nearest one.
-
-    Args:
-        inside: [n, 2] neighbours within a chart.
-        chart: [m] the number of each texel's chart.
-        positions, normals: [m, 3] the texels' points and normals, these of any length.
-    """
+    """[k, 2] pairs of texels of different charts, each at the border of its own and the other the nearest one; `inside` [n, 2] are
+    neighbours within a chart, `positions` and `normals` [m, 3] the texels' points and normals of any length."""
     spacing = (
         np.median(np.linalg.norm(positions[inside[:, 0]] - positions[inside[:, 1]], axis=1)) if len(inside) else 0.0
     )

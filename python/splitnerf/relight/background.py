@@ -70,16 +70,10 @@ def environment_behind(view: View, environment: np.ndarray) -> np.ndarray:
 
 
 def compose(images: dict[str, np.ndarray], behind: np.ndarray | None, exposure: float) -> np.ndarray:
-    """Puts a rendering over its background [h, w, 3], in linear light; None for no background.
-
-    Args:
-        images: `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity of
-            its black shadow, alpha + shadow <= 1; see `AssetRenderer.render`.
-
-    Returns:
-        [h, w, 4] float32, linear, premultiplied: exposure * radiance + (1 - alpha - shadow) * behind, alpha 1; without
-        a background the sum of both opacities is the alpha.
-    """
+    """Puts a rendering over its background `behind` [h, w, 3]: [h, w, 4] float32, linear, premultiplied; the colour is exposure *
+    radiance + (1 - alpha - shadow) * behind, the alpha 1. Without a background (None) the alpha is the sum of both opacities.
+    `images` holds `radiance` [h, w, 3] premultiplied by `alpha` [h, w], and with a catcher `shadow` [h, w], the opacity of its
+    black shadow, alpha + shadow <= 1; see `AssetRenderer.render`."""
     opacity = np.clip(images["alpha"] + images.get("shadow", 0.0), 0, 1)[..., None]
     color = exposure * images["radiance"]
     if behind is None:

@@ -55,16 +55,13 @@ def bounding_sphere(asset: Asset) -> tuple[np.ndarray, float]:
 def turntable(
     asset: Asset, count: int, *, elevation: float = 20.0, rotate: str = "camera", size: tuple[int, int | None] | None
 ) -> list[View]:
-    """Cameras on a circle around the object, the first in front; its bounding sphere fills the picture except for a
-    margin of 10 %.
+    """Cameras on a circle around the object, the first in front; its bounding sphere fills the picture except for a margin of 10 %.
+    Raises InputError where the count or the elevation is out of range.
 
     Args:
         elevation: The elevation of the camera above the horizon, degrees in (-90, 90).
         rotate: "camera", or "light" to keep the camera and turn the light, counter-clockwise seen from above.
         size: The result of `parse_size`; without a height the picture is square, and None means 512x512.
-
-    Raises:
-        InputError: The count or the elevation is out of range.
     """
     if not 1 <= count <= MOST_VIEWS:
         raise InputError(f"--turntable must be at least 1 and at most {MOST_VIEWS}, got {count}")

@@ -78,16 +78,9 @@ def relight(
     *,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Renders a run's asset or a glTF file under environment maps into NNN.png and NNN.exr and, if requested, GIF or
-    MP4; with several maps, each has a folder with its name below `out`.
-
-    Returns:
-        The folder of each map.
-
-    Raises:
-        InputError: An argument cannot be used; then nothing was written or removed.
-        OSError: A file cannot be written.
-    """
+    """Renders a run's asset or a glTF file under environment maps into NNN.png and NNN.exr and, if requested, GIF or MP4; with
+    several maps, each has a folder with its name below `out`. Returns the folder of each map. Raises InputError where an argument
+    cannot be used; then nothing was written or removed. Raises OSError where a file cannot be written."""
     folders = [out] if len(maps) == 1 else [out / folder_name(path) for path in maps]
     if len(set(folders)) < len(folders):
         raise InputError(f"{out}: two maps have the same name and would share a folder; rename one")

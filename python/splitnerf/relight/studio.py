@@ -38,11 +38,8 @@ def is_studio_light(name: str | Path) -> bool:
 
 
 def light_named(name: str | Path) -> np.ndarray:
-    """The light of an .exr or .hdr file, see `read_environment`, or the studio light of this name.
-
-    Raises:
-        InputError: It is neither.
-    """
+    """The light of an .exr or .hdr file, see `read_environment`, or the studio light of this name. Raises InputError if it is
+    neither."""
     if is_studio_light(name):
         return studio_light(str(name))
     if not Path(name).is_file():

@@ -141,10 +141,8 @@ class SceneModel(nn.Module):
 
     @property
     def s(self) -> Tensor:
-        """Sharpness s = exp(10 v) [] of the NeuS density, in [1, e^9], 1 / scene units.
-
-        Source: NeuS (Wang et al. 2021), section 4.1, and its released code.
-        """
+        """Sharpness s = exp(10 v) [] of the NeuS density, in [1, e^9], 1 / scene units. Source: NeuS (Wang et al. 2021), section
+        4.1, and its released code."""
         return sharpness(self.variance)
 
     @property
@@ -188,14 +186,9 @@ class SceneModel(nn.Module):
         roughness: Tensor,
         segments: ShadingSubset | None = None,
     ) -> Occlusion:
-        """The occlusion factors at points [n, 3] of the surface; no gradient flows into the geometry.
-
-        Args:
-            inputs: See :meth:`head_inputs`.
-            positions, normals, lobe_dirs, roughness: See :class:`splitnerf.fields.VisibilityBits`.
-            segments: The points as samples of rays; cached visibility is looked up once for each segment of a ray. None: for
-                every point.
-        """
+        """The occlusion factors at points [n, 3] of the surface; no gradient flows into the geometry. `inputs` are those of
+        :meth:`head_inputs`, the other arguments as for :class:`splitnerf.fields.VisibilityBits`. With `segments`, the points as
+        samples of rays, cached visibility is looked up once for each segment of a ray."""
         if self.bits is not None and not self.bits.is_unoccluded:
             return self.bits(positions, normals, lobe_dirs, roughness, segments)
         if self.occlusion is not None and self.has_mesh:
@@ -349,12 +342,9 @@ class SceneModel(nn.Module):
 
     @torch.no_grad()
     def refresh_indirect(self, light: EvaluatedLight) -> None:
-        """Shades the emitters of the mesh again, with the split sum. They receive the radiance of the refresh before, so
-        that each call adds a bounce.
-
-        An emitter reflects towards the one direction that it is seen from. Its specular light is the environment's, or
-        that of the emitter that it sees in the mirror direction. Seen from behind it is black.
-        """
+        """Shades the emitters of the mesh again, with the split sum. They receive the radiance of the refresh before, so that each
+        call adds a bounce. An emitter reflects towards the one direction that it is seen from. Its specular light is the
+        environment's, or that of the emitter that it sees in the mirror direction. Seen from behind it is black."""
         c, bits, chunk = self.config.shading, self.bits, SHADED_CHUNK[self.device.type]
         if bits is None or bits.emitters is None or bits.is_unoccluded:
             return

@@ -65,7 +65,6 @@ class OccupancyGrid:
             sdf: A function from points [n, 3] to signed distances [n], scene units.
             s: Sharpness of the NeuS density, positive.
             first: Whether to evaluate all cells; otherwise the cells near the surface and a random share of all cells.
-            step: The number of the training step.
             use_hull: Whether the cells of the visual hull stay occupied.
         """
         bound = LIPSCHITZ * self.half_diagonal + DENSITY_CUTOFF / s
@@ -98,13 +97,9 @@ class OccupancyGrid:
 
 
 class AveragedGrid(OccupancyGrid):
-    """The released code's grid: a cell is occupied while the decaying maximum of its opacity exceeds min(mean, 0.001).
-
-    It gives no guarantee: a cell may become empty when its random point misses a thin part. The opacity of a cell is
-    that of one sample whose ray meets the surface head-on.
-
-    Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it.
-    """
+    """The released code's grid: a cell is occupied while the decaying maximum of its opacity, that of one sample whose ray meets
+    the surface head-on, exceeds min(mean, 0.001). It gives no guarantee: a cell may become empty when its random point misses a
+    thin part. Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it."""
 
     def __init__(
         self, resolution: int, box: float, step: float, hull: Tensor | None = None, device: torch.device | str = "cpu"
@@ -179,10 +174,8 @@ def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intri
 
 
 def widened(mask: Tensor, radius: int) -> Tensor:
-    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns.
-
-    A mask that was widened by r, moved by up to r + 1 to both sides, leaves no gap: a few moves make any radius.
-    """
+    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns. A mask that was widened by r, moved
+    by up to r + 1 to both sides, leaves no gap: a few moves make any radius."""
     for axis in (0, 1):
         reached = 0
         while reached < min(radius, mask.shape[axis]):

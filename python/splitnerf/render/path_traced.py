@@ -12,14 +12,8 @@ MOST_SPP, LARGEST_PICTURE, MOST_VIEWS = 1 << 20, 1 << 14, 100_000  # paths a pix
 
 
 class AssetRenderer:
-    """An asset with its acceleration structure, ready for any number of views and lights.
-
-    Args:
-        asset: The asset to render; its arrays are not copied and must not change while the renderer exists.
-
-    Raises:
-        ValueError: The asset's arrays do not fit together.
-    """
+    """An asset with its acceleration structure, ready for any number of views and lights. Its arrays are not copied and must not
+    change while the renderer exists. Raises ValueError where they do not fit together."""
 
     def __init__(self, asset: Asset):
         n = len(asset.vertices)
@@ -53,7 +47,7 @@ class AssetRenderer:
         pixel_filter: str = "blackman-harris",
         catcher_height: float | None = None,
     ) -> dict[str, np.ndarray]:
-        """Path-traces one view; equal seeds give equal images.
+        """Path-traces one view; equal seeds give equal images. Raises ValueError where a map, a pose or a size cannot be used.
 
         Args:
             environment: [h, w, 3] linear radiance >= 0, equirectangular, in Blender's convention.
@@ -74,9 +68,6 @@ class AssetRenderer:
             linear, `roughness`, `metallic`, `normal` (world space, with the normal texture), `smooth_normal` (without
             the normal texture) and `depth` along the ray. With a catcher, `shadow` is the opacity of its black shadow
             (alpha + shadow <= 1).
-
-        Raises:
-            ValueError: A map, a pose or a size cannot be used.
         """
         return _core.render(
             self._scene,

@@ -10,24 +10,17 @@ from splitnerf.devices import tensor_cores
 
 
 def pixel_rays(pose: Tensor, intrinsics: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-    """World rays through image points: origins and unit directions, [n, 3] each.
-
-    Args:
-        pose: [n, 4, 4] or [4, 4] camera-to-world, OpenGL axes (x right, y up, looking along -z).
-        intrinsics: [n, 4] or [4], fx, fy, cx, cy in pixels.
-        x, y: [n] pixels; the centre of pixel (column, row) is (column + 0.5, row + 0.5).
-    """
+    """World rays through image points x, y [n]: origins and unit directions, [n, 3] each. `pose` [n, 4, 4] or [4, 4] is
+    camera-to-world, OpenGL axes (x right, y up, looking along -z), `intrinsics` [n, 4] or [4] are fx, fy, cx, cy in pixels; the
+    centre of pixel (column, row) is (column + 0.5, row + 0.5)."""
     points = torch.stack([x, y, torch.ones_like(x)], dim=-1)
     directions = F.normalize((pixel_matrix(pose, intrinsics) * points[..., None, :]).sum(-1), dim=-1)
     return pose[..., :3, 3].expand_as(directions).contiguous(), directions
 
 
 def pixel_matrix(pose: Tensor, intrinsics: Tensor) -> Tensor:
-    """[..., 3, 3] matrices that map an image point (x, y, 1) to its world direction, not normalised.
-
-    Args:
-        pose, intrinsics: See :func:`pixel_rays`.
-    """
+    """[..., 3, 3] matrices that map an image point (x, y, 1) to its world direction, not normalised; for pose and intrinsics see
+    :func:`pixel_rays`."""
     fx, fy, cx, cy = intrinsics.unbind(-1)
     zero, one = torch.zeros_like(fx), torch.ones_like(fx)
     rows = [1 / fx, zero, -cx / fx, zero, -1 / fy, cy / fy, zero, zero, -one]

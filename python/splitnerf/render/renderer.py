@@ -183,10 +183,8 @@ def find_samples(
 def place_samples(
     rays_o: Tensor, rays_d: Tensor, packed: PackedSamples, probes: ProbePoints, padded: bool
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """`positions`, `directions` and `beside` of :class:`FoundSamples`; the host does not wait for the number of samples.
-
-    Padding repeats the first samples, with directions of 0; without a sample all is 0.
-    """
+    """`positions`, `directions` and `beside` of :class:`FoundSamples`, without waiting for the number of samples. Padding repeats
+    the first samples, with directions of 0; without a sample all is 0."""
     rays, t, rows = packed.ray_indices, packed.middles, len(packed.ray_indices)
     n: int | Tensor = rows
     if padded:

@@ -17,13 +17,8 @@ GRAZING = 0.05  # cosine between the surface's normal and a line of sight below 
 
 
 class Cameras(NamedTuple):
-    """The cameras of photos.
-
-    Attributes:
-        poses: [n, 4, 4] float32 camera-to-world, OpenGL axes, scene units.
-        intrinsics: [n, 4] float32 fx, fy, cx, cy, pixels.
-        sizes: [n, 2] int64 height and width, pixels.
-    """
+    """The cameras of photos: `poses` [n, 4, 4] float32 camera-to-world, OpenGL axes, scene units; `intrinsics` [n, 4] float32 fx,
+    fy, cx, cy, and `sizes` [n, 2] int64 height and width, in pixels."""
 
     poses: Tensor
     intrinsics: Tensor
@@ -37,19 +32,12 @@ class Cameras(NamedTuple):
 
 
 class InView(NamedTuple):
-    """The points that a photo shows.
+    """The points that a photo shows."""
 
-    Attributes:
-        rows: [r] int64 their numbers.
-        at: [r, 2] float32 their image points, pixels.
-        cosine: [r] float32 of the surface's normal and the line of sight.
-        distance: [r] float32 from the camera.
-    """
-
-    rows: Tensor
-    at: Tensor
-    cosine: Tensor
-    distance: Tensor
+    rows: Tensor  # [r] int64 their numbers
+    at: Tensor  # [r, 2] float32 their image points, pixels
+    cosine: Tensor  # [r] float32 of the surface's normal and the line of sight
+    distance: Tensor  # [r] float32 from the camera
 
 
 def in_view(
@@ -82,13 +70,8 @@ def in_view(
 
 
 def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, offset: float) -> np.ndarray:
-    """[n] bool, whether a photo shows a vertex, see :func:`in_view`.
-
-    Args:
-        vertices, faces: The mesh, [n, 3] float32 scene units, and [m, 3], outward.
-        cameras: The photos' cameras.
-        offset: How far in front of the surface a line of sight begins, scene units.
-    """
+    """[n] bool, whether a photo shows a vertex, see :func:`in_view`, of a mesh: vertices [n, 3] float32 scene units, faces [m, 3],
+    outward. `offset` is how far in front of the surface a line of sight begins, scene units."""
     scene, points = MeshScene(vertices, faces), torch.from_numpy(vertices)
     normals = torch.tensor(trimesh.Trimesh(vertices, faces, process=False).vertex_normals, dtype=torch.float32)
     seen = torch.zeros(len(vertices), dtype=torch.bool)
@@ -99,7 +82,6 @@ def seen_vertices(vertices: np.ndarray, faces: np.ndarray, cameras: Cameras, off
 
 
 def majority(faces: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """[n] bool, the majority over the corners of a vertex's faces, because a ray in a million slips between two
-    faces."""
+    """[n] bool, the majority over the corners of a vertex's faces, because a ray in a million slips between two faces."""
     votes = np.bincount(faces.ravel(), 2.0 * flags[faces].sum(1).repeat(3) - 3.0, minlength=len(flags))
     return np.where(votes == 0, flags, votes > 0)

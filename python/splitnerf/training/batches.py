@@ -27,12 +27,9 @@ LEAST_EDGE = 8  # pixels along the shorter edge of an average
 
 
 def training_photos(dataset: Dataset, config: Config) -> Dataset:
-    """The photos themselves, or averages by the largest whole factor that `sampling.pixel_cells` allows.
-
-    A pixel of an average is the mean of its block in linear light, as in a smaller photo, also along the masks' edges.
-    Detail finer than the fields' cells is noise to them; the mean of a block has less of it than a pixel, at the same
-    cost of a step.
-    """
+    """The photos themselves, or averages by the largest whole factor that `sampling.pixel_cells` allows. A pixel of an average is
+    the mean of its block in linear light, as in a smaller photo, also along the masks' edges. Detail finer than the fields' cells
+    is noise to them; the mean of a block has less of it than a pixel, at the same cost of a step."""
     factor = averaging_factor(dataset, config)
     if factor == 1:
         return dataset
@@ -72,11 +69,9 @@ PARTLY = 0.02, 0.98  # a pixel of a coverage in between lies on an edge
 def edge_runs(
     photos: list[tuple[tuple[np.ndarray, np.ndarray], np.ndarray]], n_pixels: int, device: torch.device
 ) -> EdgeRuns:
-    """The pixels within a band along the edges of the masks, of the results of :func:`edge_of` for photos with as many pixels.
-
-    There a mask is not trusted to a pixel: a colour is compared including the background, the object over the colour behind
-    it. 24 bytes a run of neighbours and 3 a pixel.
-    """
+    """The pixels within a band along the edges of the masks, of the results of :func:`edge_of` for photos with as many pixels, in
+    24 bytes a run of neighbours and 3 a pixel. There a mask is not trusted to a pixel: colours are compared including the
+    background."""
     if not photos:
         return EdgeRuns.none(device)
     starts, ends = joined([runs for runs, _ in photos], n_pixels)
@@ -116,9 +111,8 @@ def edge_mask(
 
 
 def average_with_edges(photo: np.ndarray, factor: int, known: np.ndarray | None, width: int) -> np.ndarray:
-    """Averages a photo [H, W, 4] down as :func:`edge_runs` has it compared: along the mask's edges and outside of it, a
-    pixel is the mean of object and background; elsewhere it is that of the object alone. `known` [h, w] are the valid
-    averages, `width` the pixels of the average on each side of an edge. Gives [h, w, 4] uint16."""
+    """A photo [H, W, 4] averaged down to [h, w, 4] uint16 as :func:`edge_runs` has it compared: within `width` pixels of the mask's
+    edges and outside, means of object and background, else of the object alone. `known` [h, w] are the valid averages."""
     result, whole = (averaged_codes(photo, factor, object_alone=alone) for alone in (True, False))
     whole, alpha = whole[..., :3], decoded(result[..., 3])
     shown = edge_mask(whole, alpha, known, width)[0] | (alpha <= PARTLY[0])
@@ -307,10 +301,8 @@ class Batch(NamedTuple):
 
 
 def draw_batch(source: PixelSource, n_rays: int, config: Config, exposures: Tensor) -> Batch:
-    """Rays through ``n_rays`` random pixels, drawn by the source's generator; `exposures` [views, 3] are the photos'.
-
-    Where samples are added as sRGB, colours at another exposure are not known: the photos are brought to an exposure of 1.
-    """
+    """Rays through ``n_rays`` random pixels, drawn by the source's generator; `exposures` [views, 3] are the photos'. Where samples
+    are added as sRGB, colours at another exposure are not known: the photos are brought to an exposure of 1."""
     pixels, jitter, phase, backgrounds, chosen, probes = draw_numbers(
         source.generator, [n_rays, n_rays, n_rays, 3 * n_rays, *probe_counts(config)]
     )

@@ -55,11 +55,8 @@ def save(training: Any) -> None:
 
 
 def restore(training: Any) -> None:
-    """Puts the state of its run's checkpoint into a :class:`splitnerf.training.loop.Training`.
-
-    Raises:
-        InputError: The checkpoint cannot be read, or belongs to other images or settings.
-    """
+    """Puts the state of its run's checkpoint into a :class:`splitnerf.training.loop.Training`. Raises InputError where the
+    checkpoint cannot be read, or belongs to other images or settings."""
     t, path = training, training.run / "checkpoint.pt"
     content = load_checkpoint(path)
     check_same_scene(content, t.fingerprint, t.run)
@@ -86,13 +83,9 @@ def save_checkpoint(path: Path, *, config: Config, fingerprint: str, state: dict
 
 
 def load_checkpoint(path: Path) -> dict:
-    """Reads a checkpoint from any source, see :func:`splitnerf.data.tensor_files.read_tensors`, and checks every value:
-    its type, shape and range are those that the trainer writes.
-
-    Raises:
-        InputError: The file is missing, truncated or of another format, or it holds values that the trainer does not
-            write or numbers that are not finite.
-    """
+    """Reads a checkpoint from any source, see :func:`splitnerf.data.tensor_files.read_tensors`. Raises InputError where the file is
+    missing, truncated or of another format, or it holds values whose type, shape or range the trainer does not write, or numbers
+    that are not finite."""
     if not path.is_file():
         raise InputError(f"{path}: no checkpoint there; train without --resume first")
     try:

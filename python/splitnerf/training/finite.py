@@ -43,11 +43,7 @@ def first_not_finite(values: Iterable[tuple[str, Tensor]]) -> str | None:
 
 
 def check_state(step: int, model: SceneModel, optimiser: torch.optim.Optimizer) -> None:
-    """Checks all parameters and the optimiser's moments.
-
-    Raises:
-        Diverged: A parameter or a moment is not finite.
-    """
+    """Checks all parameters and the optimiser's moments. Raises Diverged where one is not finite."""
     state = list(_state(model, optimiser))
     norms = torch._foreach_norm([value for _, value in state])
     if math.isfinite(

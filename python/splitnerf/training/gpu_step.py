@@ -31,23 +31,15 @@ SPARE = 1.1  # a graph holds so many times the last known counts, else it is rec
 
 
 class Recorded(NamedTuple):
-    """A recorded step.
+    """A recorded step."""
 
-    Attributes:
-        graph: The recorded work.
-        batch, found, light: The graph's inputs, in memory of their own.
-        outputs: The rendered rays and the terms of the loss.
-        grads: The gradients of the model's parameters, in memory that each replay overwrites.
-        capacity: The largest numbers of samples, shaded samples and segments that the graph can hold.
-    """
-
-    graph: torch.cuda.CUDAGraph
-    batch: Batch
+    graph: torch.cuda.CUDAGraph  # the recorded work
+    batch: Batch  # like found and light an input of the graph, in memory of its own
     found: FoundSamples
     light: EvaluatedLight
-    outputs: tuple[RenderedRays, Terms]
-    grads: list[Tensor | None]
-    capacity: Capacity
+    outputs: tuple[RenderedRays, Terms]  # the rendered rays and the terms of the loss
+    grads: list[Tensor | None]  # of the model's parameters, in memory that each replay overwrites
+    capacity: Capacity  # the largest numbers of samples, shaded samples and segments that the graph can hold
 
 
 class GpuStep(Step):
@@ -110,8 +102,7 @@ class GpuStep(Step):
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that
-        stream."""
+        """Runs the block's work in the CUDA stream that graphs are recorded in; autograd ties gradients to that stream."""
         if self._stream is None:
             yield
             return
@@ -193,13 +184,9 @@ class GpuStep(Step):
 
 
 def record(function: Callable[[], Any], pool: Any, generator: torch.Generator) -> tuple[torch.cuda.CUDAGraph, Any]:
-    """Records the work of a function without running it; returns the graph and the function's result.
-
-    Args:
-        function: Work that never waits for a result of the GPU; called once.
-        pool: The memory that graphs share. No graph may rely on values that another graph left there.
-        generator: The random generator that the function draws from.
-    """
+    """Records the work of a function without running it; returns the graph and the function's result. The function never waits for
+    a result of the GPU, is called once, and draws from `generator`. Graphs share the memory `pool`; none may rely on values that
+    another left there."""
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(generator)
     collects = gc.isenabled()

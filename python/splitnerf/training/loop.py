@@ -116,11 +116,7 @@ class Training:
         return self.step % light_period(self.config) == 0
 
     def save(self) -> None:
-        """Writes the checkpoint.
-
-        Raises:
-            Diverged: A parameter is not finite; the old checkpoint is kept.
-        """
+        """Writes the checkpoint. Raises Diverged where a parameter is not finite; the old checkpoint is kept."""
         self.settle()
         check_state(self.step, self.model, self.optimiser)
         self.saved_at = self.seconds
@@ -133,13 +129,9 @@ class Training:
         self.started = time.monotonic() - self.seconds
 
     def complete(self) -> None:
-        """Trains to the end of the schedule, or until a signal or the observer requests the end.
-
-        Raises:
-            splitnerf.training.finite.Diverged: Numbers are no longer finite, by the rule in that class; the last
-                checkpoint is kept.
-            OSError: The disk is full; the last checkpoint is kept.
-        """
+        """Trains to the end of the schedule, or until a signal or the observer requests the end. Raises
+        :class:`splitnerf.training.finite.Diverged` where numbers are no longer finite, by the rule there, and OSError where the
+        disk is full; the last checkpoint is kept."""
         c = self.config
         keep_metrics(self.run / METRICS, self.step)
         self.observer(Event("begun", self))
@@ -164,8 +156,7 @@ class Training:
             self.finish()
 
     def refresh(self) -> None:
-        """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the
-        mesh."""
+        """Updates what steps share: open levels, learning rates, occupied cells, the mesh, and the light on the mesh."""
         c, model, progress, step = self.config, self.model, self.progress, self.step
         model.open_levels(progress)
         set_learning_rate(self.optimiser, c, step, progress)
@@ -191,11 +182,8 @@ class Training:
         self.settle(read, bar)
 
     def settle(self, read: Iterable[StepNumbers] | None = None, bar: Progress | None = None) -> None:
-        """Does what follows from the numbers of steps; without `read`, of all that are not read yet.
-
-        Raises:
-            Diverged: A loss is not finite.
-        """
+        """Does what follows from the numbers of steps; without `read`, of all that are not read yet. Raises Diverged where a loss
+        is not finite."""
         for numbers in self.take_step.unread() if read is None else read:
             if numbers.complete and not math.isfinite(numbers.loss):
                 raise explain_loss(numbers.step - 1, numbers.values, self.model, *self.take_step.newest)

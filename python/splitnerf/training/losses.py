@@ -35,15 +35,10 @@ MOST_SMOOTHER = 10.0  # factor of it where their error is larger
 
 
 class Term(NamedTuple):
-    """One term of the loss.
+    """One term of the loss."""
 
-    Attributes:
-        weight: The factor of the term in the loss.
-        value: [] the term without its weight; no gradient.
-    """
-
-    weight: float
-    value: Tensor
+    weight: float  # its factor in the loss
+    value: Tensor  # [] without the weight; no gradient
 
 
 class Terms(dict[str, Term]):
@@ -147,11 +142,9 @@ def loss_terms(
 
 
 def prior_factors(error: Tensor) -> Tensor:
-    """[2] factors of the eikonal and the smoothness loss at a mean squared error [] of the colours.
-
-    What the model does not explain counts as noise of the photos: the larger its variance, the more a prior counts beside them (Bishop 2006,
-    Eq. (3.55)). Where little is explained yet, or ever, as of a metal that mirrors itself, normals would fit the noise.
-    """
+    """[2] factors of the eikonal and the smoothness loss at a mean squared error [] of the colours. What the model does not explain
+    counts as noise of the photos: the larger its variance, the more a prior counts beside them (Bishop 2006, Eq. (3.55)). Where
+    little is explained yet, or ever, as of a metal that mirrors itself, normals would fit the noise."""
     smooth = (error / USUAL_ERROR).clamp(max=MOST_SMOOTHER)
     return torch.stack([torch.ones_like(smooth), smooth])
 
@@ -186,16 +179,8 @@ def light_loss(light: Light, config: Config, generator: torch.Generator, seed: i
 
 
 def material_losses(albedo: Tensor, metallic: Tensor, shares: Tensor) -> Tensor:
-    """Two penalties on metallic m: for metals, and for dark metals.
-
-    Args:
-        albedo: [n, 3] linear albedo in [0, 1].
-        metallic: [n, 1] metallic m in [0, 1].
-        shares: [n] weights of the points.
-
-    Returns:
-        [2]: metal and dark_metal, weighted means of m^2 and of m (1 - F0 / 0.4)+, where F0 is the brightest channel of
-        the albedo; 0 without points.
+    """Two penalties [2] on metallic m [n, 1], 0 without points: weighted means (`shares` [n]) of m^2, and of m (1 - F0 / 0.4)+,
+    where F0 is the brightest channel of the linear albedo [n, 3], in [0, 1].
 
     Source: SplitNeRF Eq. (18), over all samples instead of a tenth. A dark metal and a black dielectric with F0 = 0.04
     look nearly alike, but no dark metals exist (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2).
@@ -216,22 +201,16 @@ def neutral_light_loss(light: EvaluatedLight, config: Config, generator: torch.G
 
 
 class SeenLight:
-    """A term of the loss that holds the light near that which photos show around the object.
-
-    Args:
-        surroundings: [h, 2 h, 4] radiance and how well it is known, see :class:`splitnerf.data.dataset.Dataset`.
-        device: The light's device.
-    """
+    """A term of the loss that holds the light near that which photos show around the object: `surroundings` [h, 2 h, 4], radiance
+    and how well it is known, see :class:`splitnerf.data.dataset.Dataset`."""
 
     def __init__(self, surroundings: np.ndarray, device: torch.device):
         self._surroundings, self._device = surroundings, device
         self._target: Tensor | None = None
 
     def loss(self, light: EvaluatedLight) -> Tensor:
-        """The mean over the sphere of the cost of the light's log radiance beside that of the photos.
-
-        The cost is that of Student's t distribution: what stands near is not what the object sees in that direction.
-        """
+        """The mean over the sphere of the cost of the light's log radiance beside that of the photos, the cost of Student's t
+        distribution: what stands near is not what the object sees in that direction."""
         texels = light.partition(SEEN_TEXELS, self._device)
         if self._target is None:
             radiance, known = (
@@ -268,13 +247,9 @@ def material_entropy_loss(ray: RenderedRays, config: Config, generator: torch.Ge
 def occlusion_loss(
     ray: RenderedRays, scene: MeshScene, environment: Tensor, config: Config, generator: torch.Generator, seed: int
 ) -> Tensor:
-    """Weighted squared distance of the predicted occlusion factors from traced ones, on a random share of the samples.
-
-    Rays start at the samples, moved on to the surface, and are traced on the CPU; a GPU waits for them. The specular
-    lobe's axis is the normal.
-
-    Source: SplitNeRF Eq. (12)-(16).
-    """
+    """Weighted squared distance of the predicted occlusion factors from traced ones (SplitNeRF Eq. (12)-(16)), on a random share of
+    the samples. Rays start at the samples, moved on to the surface, and are traced on the CPU; a GPU waits for them. The specular
+    lobe's axis is the normal."""
     c, share = config, config.constants.occlusion_share
     chosen = (torch.rand(len(ray.shaded), generator=generator, device=generator.device) < share).nonzero().squeeze(1)
     if len(chosen) == 0:

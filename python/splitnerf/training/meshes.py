@@ -19,18 +19,12 @@ ENVIRONMENT_EVERY = 16  # steps between refreshes of the light that weighs the o
 
 
 class TracedMesh(NamedTuple):
-    """A mesh through which rays can be traced, and what its vertices see.
+    """A mesh through which rays can be traced, and what its vertices see."""
 
-    Attributes:
-        scene: The mesh below.
-        vertices, faces: [n, 3] float32 and [m, 3] int32, on the CPU.
-        bits: The visibility of the vertices; None where occlusion is not cached.
-    """
-
-    scene: MeshScene
-    vertices: Tensor
+    scene: MeshScene  # the mesh, ready to be traced
+    vertices: Tensor  # [n, 3] float32, on the CPU like faces, [m, 3] int32
     faces: Tensor
-    bits: VisibilityBits | None
+    bits: VisibilityBits | None  # the visibility of the vertices; None where occlusion is not cached
 
 
 class SurfaceMesh:
@@ -63,12 +57,8 @@ class SurfaceMesh:
         return self.current.scene if self.current else None
 
     def request(self, progress: float) -> None:
-        """Makes a mesh of the current surface. With ``background`` the thread makes it, unless it is still busy with an
-        earlier mesh. The old mesh stays in use while the field has no surface.
-
-        Raises:
-            RuntimeError: The field is not finite.
-        """
+        """Makes a mesh of the current surface. With ``background`` the thread makes it, unless it is still busy with an earlier
+        mesh. The old mesh stays in use while the field has no surface. Raises RuntimeError where the field is not finite."""
         if self._made is not None:
             return
         self.asked_at, network, aims = progress, self.model.sdf_field.network(), self.model.aims()
@@ -80,11 +70,8 @@ class SurfaceMesh:
         self._made = in_background(make_beside, self._side, self.model, network, aims)
 
     def poll(self, wait: bool = False) -> None:
-        """Uses the mesh of the thread if it is ready; with ``wait``, waits for it.
-
-        Raises:
-            RuntimeError: The field was not finite.
-        """
+        """Uses the mesh of the thread if it is ready; with ``wait``, waits for it. Raises RuntimeError where the field was not
+        finite."""
         if self._made is not None and (wait or self._made.done()):
             made, self._made = self._made, None
             mesh = made.result()

@@ -23,12 +23,8 @@ LOG_EVERY = 20  # steps between lines of metrics.jsonl; the first steps and the 
 
 
 class StepLog:
-    """The numbers of a run's steps, as lines of metrics.jsonl and as the bar's text.
-
-    Attributes:
-        psnr: The batches' mean PSNR in dB, of the last steps above all; None before the first.
-        pending: The line of the last step read, while metrics.jsonl lacks it.
-    """
+    """The numbers of a run's steps, as lines of metrics.jsonl and as the bar's text. `psnr` is the batches' mean in dB, of the last
+    steps above all, None before the first; `pending` is the line of the last step read, while metrics.jsonl lacks it."""
 
     def __init__(self, run: Path):
         self.path, self.psnr, self.pending = run / METRICS, None, None

@@ -61,15 +61,9 @@ NOBODY: Observer = together(())
 
 
 class TensorBoard:
-    """An observer that writes the lines of metrics.jsonl as scalars and the previews as images; within a block, which
-    closes the file.
-
-    Args:
-        folder: The folder of the event files; it is made when training begins.
-
-    Raises:
-        InputError: The package is not installed, or the path is a file.
-    """
+    """An observer that writes the lines of metrics.jsonl as scalars and the previews as images into a folder, which is made when
+    training begins; within a block, which closes the file. Raises InputError where the package is not installed, or the path is a
+    file."""
 
     def __init__(self, folder: Path):
         try:

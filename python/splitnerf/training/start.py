@@ -173,14 +173,10 @@ def start_shape(photos: Dataset, hull: Tensor, config: Config) -> StartShape | N
 
 
 def followed(photos: GreyPhotos, base: Tensor, free: Tensor, most: int) -> float:
-    """How much windows that follow a surface are alike, as a part of those that face the camera, each at its best depth.
-
-    What a mirror shows fits at some depth in each photo, but no surface has all of these depths.
-
-    Args:
-        photos, base, most: As of :func:`splitnerf.render.stereo.refined_depths`.
-        free: [n, h, w] the scores of :func:`splitnerf.render.stereo.depth_maps`, of the same photos.
-    """
+    """How much windows that follow a surface are alike, as a part of those that face the camera, each at its best depth: `free`
+    [n, h, w], the scores of :func:`splitnerf.render.stereo.depth_maps` of the same photos; the rest as of
+    :func:`splitnerf.render.stereo.refined_depths`. What a mirror shows fits at some depth in each photo, but no surface has all of
+    these depths."""
     scores, on_it = refined_depths(photos, base, *FOLLOWING, most)[1], base[spread_out(len(base), most)] > 0
     means = [float(x[on_it].clamp(min=0).mean()) for x in (scores, free)]
     return means[0] / max(means[1], 1e-6)

@@ -54,7 +54,6 @@ class StepNumbers(NamedTuple):
 
     Attributes:
         step: Its number, counted from 1.
-        n_rays: The number of its rays.
         values, weights: The terms of the loss and their weights, by name; the colour's term comes first.
         gradient_norm: The Euclidean norm of all gradients.
         counts: The samples found, and those shaded and their segments.
@@ -149,17 +148,13 @@ class Step:
         self.capacity, self.skipped, self._skipped_in_a_row = Capacity(), 0, 0
 
     def __call__(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> Iterable[StepNumbers]:
-        """Takes the gradients of a batch and moves the parameters, those of the light where its turn has come.
+        """Takes the gradients of a batch and moves the parameters, those of the light where its turn has come. Returns the numbers
+        of the steps that are read by now, in their order; where a loss is not finite nothing has moved. Raises Diverged where the
+        gradients of too many steps in a row are not finite.
 
         Args:
             light: The evaluated light; of no use any more where its parameters moved.
             step, progress: The number of the step, and the training's progress in [0, 1].
-
-        Returns:
-            The numbers of the steps that are read by now, in their order. Where a loss is not finite nothing has moved.
-
-        Raises:
-            Diverged: The gradients of too many steps in a row are not finite.
         """
         numbers = self.begin(batch, light, step, progress).read()
         if self.judge(numbers):
@@ -197,12 +192,8 @@ class Step:
         return PendingNumbers(step, len(batch.target), weights, self.capacity, allowed, start_fetching(numbers))
 
     def judge(self, numbers: StepNumbers) -> bool:
-        """Whether a step's gradients may be used: its results were complete, its loss is a number, and its gradient can
-        be squared. Counts the others.
-
-        Raises:
-            Diverged: The gradients of ten steps in a row may not.
-        """
+        """Whether a step's gradients may be used: its results were complete, its loss is a number, and its gradient can be squared.
+        Counts the others. Raises Diverged where those of ten steps in a row may not."""
         if numbers.complete and not math.isfinite(numbers.loss):
             return False  # which ends the run
         if numbers.complete and numbers.gradient_norm < LARGEST:
@@ -220,12 +211,9 @@ class Step:
         return False
 
     def gradients(self, batch: Batch, light: EvaluatedLight, step: int, progress: float) -> tuple[RenderedRays, Terms]:
-        """Finds the rays' samples, renders them and stores the gradients of the losses at the model's parameters and the
-        light's leaves; the arguments are those of a call.
-
-        Returns:
-            The rendered rays, and the terms of the loss by name; the colour's term comes first.
-        """
+        """Finds the rays' samples, renders them and stores the gradients of the losses at the model's parameters and the light's
+        leaves; the arguments are those of a call. Returns the rendered rays, and the terms of the loss by name; the colour's term
+        comes first."""
         return self.differentiate(batch, self.find(batch, progress), light, step, progress)
 
     def find(self, batch: Batch, progress: float, capacity: int = 0) -> FoundSamples:

@@ -124,9 +124,8 @@ def _z_up(vectors: np.ndarray) -> np.ndarray:
 
 
 def _read_material(document: Document, index: int | None) -> tuple[Material, TextureSlots]:
-    """Reads one material, alpha and occlusion left out, and where its textures lie; index None means glTF's default material (white, rough,
-    metallic). Raises InputError where an image cannot be read, or the textures need more than one set of coordinates.
-    """
+    """One material without alpha and occlusion, and where its textures lie; index None means glTF's default (white, rough,
+    metallic). Raises InputError where an image cannot be read, or the textures need more than one set of coordinates."""
     if index is None:
         note(f"{document.path}: a mesh has no material; drawn as glTF's default, white, roughness 1, metallic 1")
         return Material(name="default", metallic=1.0), TextureSlots(document, "default")

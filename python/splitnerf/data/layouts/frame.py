@@ -26,11 +26,9 @@ class Frame:
 
     Attributes:
         name: The frame's name: the file's stem, or the folder's name where each view has its own folder.
-        image_path: The image file.
         pose: [4, 4] float64 camera-to-world, OpenGL axes, in the data's world.
         lens: The numbers of the pinhole that the data give: `camera_angle_x` (radians), `fl_x fl_y cx cy w h` (pixels).
         distortion: What the image has to be freed from, or None.
-        mask_path: The mask file, or None.
         mask_kind: What the mask is: "object" (white is the object; it replaces the image's alpha), "ignore" (black is
             to be ignored), or "auto" where the layout leaves it open.
         dynamic_mask_path: A file that is white where the image is to be ignored, or None.

@@ -70,8 +70,7 @@ def read(root: Path, split: None = None) -> list[Frame]:
 
 
 def read_matrices(path: Path) -> list[np.ndarray]:
-    """The matrices `world_mat_0`, `world_mat_1`, ... [4, 4] of a file. Raises InputError where it is no such file, or
-    it claims to hold more than it does."""
+    """The matrices `world_mat_0`, ... [4, 4] of a file. Raises InputError where it is none, or claims to hold more than it does."""
     try:
         with np.load(path, mmap_mode="r", allow_pickle=False) as archive:
             names = [name for name in archive.files if re.fullmatch(r"world_mat_\d{1,6}", name)]
@@ -86,9 +85,8 @@ def read_matrices(path: Path) -> list[np.ndarray]:
 
 
 def decompose(matrix: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """The pinhole of a projection K [R | t] [3 or 4, 4], up to a factor, from the world to pixels whose first centre is
-    (0, 0): [4] (fx, fy, cx, cy) with pixel centres at +0.5, and [4, 4] camera-to-world, OpenGL axes. Raises InputError,
-    which calls the matrix by its name, where it is none."""
+    """(fx, fy, cx, cy) [4], pixel centres at +0.5, and camera-to-world [4, 4], OpenGL axes, of a projection K [R | t] [3 or 4, 4],
+    up to a factor, from the world to pixels whose first centre is (0, 0). Raises InputError, with its name, where it is none."""
     usable = matrix.shape in ((4, 4), (3, 4)) and matrix.dtype.kind in "fiu"
     part = matrix[:3].astype(np.float64) if usable else np.full((3, 4), np.nan)
     if not np.isfinite(part).all() or not abs(np.linalg.det(part[:, :3])) > 1e-30:
@@ -116,8 +114,7 @@ def _pictures(folder: Path) -> list[Path]:
 
 
 def _paired(images: list[Path], masks: list[Path], folder: Path) -> dict[Path, Path]:
-    """The mask of each of as many images: of its name, or else its stem, or else its numbers. Raises InputError where all three leave
-    it open for one."""
+    """The mask of each image: of its name, else its stem, else its numbers. Raises InputError where all three leave one open."""
     for key in (lambda path: path.name, lambda path: path.stem, _key):
         of_key, keys = {key(mask): mask for mask in masks}, list(map(key, images))
         if of_key.keys() == {*keys} and len(of_key) == len(images):
