@@ -204,12 +204,12 @@ def data_of(scene: str, size: int, work: Path) -> Path | None:
     return data if splitnerf("synth", *words, "--out", data, *counts) else None
 
 
-def relit_by_blender(python: Path, asset: Path, data: Path, work: Path, n_views: int = 6, spp: int = 64) -> dict:
+def relit_by_blender(python: Path, asset: Path, data: Path, run: Path, n_views: int = 6, spp: int = 64) -> dict:
     """The scores of an asset's views under the data's maps, rendered and denoised by Cycles; empty where there is no map."""
     views, maps = choose_views(load_dataset(data, "test"), Protocol(views=n_views))
     if not maps:
         return {}
-    cameras, picture, images = work / "cameras.json", work / "blender.png", {name: [] for name in maps}
+    cameras, picture, images = run / "cameras.json", run / "blender.png", {name: [] for name in maps}
     keys = "fl_x", "fl_y", "cx", "cy"
     frames = [
         {"transform_matrix": pose.tolist(), "w": views.width, "h": views.height} | dict(zip(keys, map(float, lens)))
@@ -251,7 +251,7 @@ def rows_of(
         found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
         found["training"] = late_steps(run)
         if blender:
-            found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, work)
+            found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, run)
         rows.append(key | scored(found) | {name: facts[name] for name in ("kernels", "commit")})
     if page.pictures:
         (sheet := sheet_of(scene, work)).unlink(missing_ok=True)
