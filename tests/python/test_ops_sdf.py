@@ -5,7 +5,18 @@ import math
 import op_cases
 import pytest
 import torch
-from op_cases import BOX, CASES, HASH_SPEC, STEP, bumpy_field, field_rays, full_cells, hash_inputs, sdf_field_inputs
+from op_cases import (
+    BOX,
+    CASES,
+    HASH_SPEC,
+    STEP,
+    bumpy_field,
+    field_rays,
+    full_cells,
+    hash_inputs,
+    sdf_field_inputs,
+    unit,
+)
 from op_checks import DEVICES, check_error, generator, grad_leaves, lib, on_threads
 from splitnerf.fields.surface import SdfField
 from splitnerf.ops import HashGrid, HashGridSpec, hash_encode, march_rays, surface_weights
@@ -130,6 +141,17 @@ def test_where_the_field_is_steeper_than_promised_the_walk_goes_back():
 def test_empty_cells_are_not_asked():
     samples, evaluated, _ = sampled(bumpy_field(), field_rays(), torch.full_like(full_cells(), CELL_EMPTY))
     assert len(samples.t_starts) == 0 and int(evaluated.sum()) == 0
+
+
+def test_neither_side_of_empty_cells_is_kept():
+    """Rays that pass a ball of radius 0.7 by 0.25 and more: where cells are empty the distance does not fall to the surface."""
+    o = torch.tensor([[-1.4, 0.95, 0.0], [-1.4, 0.0, 1.0], [0.0, -1.4, -0.97]], dtype=torch.float64)
+    d, jitter = unit(torch.tensor([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])).double(), torch.rand(3).double()
+    middles = (torch.arange(48) + 0.5) / 48 * 2 * BOX - BOX
+    far = torch.stack(torch.meshgrid(middles, middles, middles, indexing="ij")).norm(dim=0) > 1.15
+    cells = torch.where(far, full_cells(48), CELL_EMPTY)
+    kept, evaluated, _ = sampled(bumpy_field(0.0), (o, d, jitter), cells)
+    assert (evaluated > 20).all() and len(kept.t_starts) == 0
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

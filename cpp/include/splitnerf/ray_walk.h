@@ -36,6 +36,7 @@ template <class T> struct Walk {
   int64_t ray;
   int64_t next;       // the sample at which the distance is asked for next; -1 where the ray has ended
   int64_t last = -1;  // the one before, -1 for none
+  int64_t stride = 1;  // so many samples on from `last`; further ones up to `next` are in empty cells
   int64_t n_evaluated = 0;
   int n_returns = 0;       // how often it went back
   T f_last = T(0);         // the distance at `last`
@@ -52,16 +53,17 @@ template <class T> struct Walk {
 template <class T> struct NextSample {
   T f, depth;     // the distance at its middle, and depth_at there
   T apart;        // from the last sample's middle
+  T occupied;     // of that, what is not in empty cells
   T transmitted;  // share of the light that passes between the middles
 };
 
 // Whether the walk's last sample or its neighbour may weigh more than min_weight: by what lies between the middles, where with
-// a slope of 1 at most f falls to (f + f_next - apart) / 2; or as surface_weights renders them, from the slope between them.
+// a slope of 1 at most f falls to (f + f_next - occupied) / 2; or as surface_weights renders them, from the slope between them.
 // No interval is deeper than exp(-s f) at its end.
 template <class T>
 SPLITNERF_HD bool may_weigh(const SampleRules<T>& rules, const Walk<T>& walk, const NextSample<T>& next) {
   const T f = walk.f_last, step = walk.lattice.step, passed = walk.transmittance;
-  const T lowest = min_of(next.f, T(0.5) * (f + next.f - next.apart)),
+  const T lowest = min_of(next.f, T(0.5) * (f + next.f - next.occupied)),
           end = min_of(lowest, min_of(f, next.f) - T(0.5) * step);
   if (rules.s * end > rules.faint || passed < rules.min_weight) return false;
   if (passed * (T(1) - next.transmitted) > rules.min_weight) return true;
@@ -86,7 +88,7 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
   if (jumped && (std::abs(f) < rules.reach || (f < T(0)) != (walk.f_last < T(0)))) {
     const int64_t between = next_occupied(walk.lattice, grid, march, walk.last + 1);
     if (between < walk.next) {
-      walk.next = between;
+      walk.next = between, walk.stride = 1;
       ++walk.n_returns;
       return;
     }
@@ -95,7 +97,8 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
   const T depth = depth_at(f, rules.s);
   if (walk.last >= 0) {
     const T transmitted = exp_of_minus(max_of(depth - walk.depth_last, T(0)));
-    if (may_weigh(rules, walk, {f, depth, T(walk.next - walk.last) * step, transmitted})) {
+    const int64_t apart = walk.next - walk.last;
+    if (may_weigh(rules, walk, {f, depth, T(apart) * step, T(min_of(apart, walk.stride)) * step, transmitted})) {
       if (!walk.last_kept) keep(walk.lattice.start(walk.last));
       kept = true;
     }
@@ -110,8 +113,8 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
   }
   const T steepest = walk.goes_back() ? rules.lipschitz : T(kSteeperThen) * rules.lipschitz;
   const T free = (std::abs(f) - rules.reach) / (steepest * step);
-  const int64_t stride = free > T(1) ? static_cast<int64_t>(min_of(free, T(walk.lattice.n_steps))) : 1;
-  walk.next = next_occupied(walk.lattice, grid, march, here + stride);
+  walk.stride = free > T(1) ? static_cast<int64_t>(min_of(free, T(walk.lattice.n_steps))) : 1;
+  walk.next = next_occupied(walk.lattice, grid, march, here + walk.stride);
 }
 
 }  // namespace splitnerf
