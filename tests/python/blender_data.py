@@ -66,7 +66,7 @@ def make_blender(root, centre=(0, 0, 0), radius=1.0, train=12, test=3, aim=None,
 def make_folders(root):
     """A sphere in view folders."""
     for i, pose in enumerate(poses_around(np.zeros(3), 1.0, 14)):
-        name = f"train_{i:03d}" if i < 12 else f"test_{2 * (i - 12) + 9:03d}"
+        name = f"train_{i:03d}" if i < 12 else f"test_{2 * (i - 12) + 9}"
         image = np.full((SIZE, SIZE, 4), 0.5)
         image[..., 3] = sphere_alpha(pose, np.zeros(3), 1.0)
         write_image(root / name / "rgba.png", image)

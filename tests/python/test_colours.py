@@ -10,6 +10,7 @@ import pytest
 from blender_data import write_exr
 from PIL import Image, ImageCms
 from splitnerf import errors
+from splitnerf.data import colours
 from splitnerf.data.colours import DISPLAY_P3, REC709
 from splitnerf.data.images import linear_to_srgb, read_codes, read_colours, read_header, read_radiance, srgb_to_linear
 from splitnerf.relight.background import read_plate
@@ -25,9 +26,8 @@ def wide_profile(name: str = "wide") -> bytes:
         if tag in columns:
             srgb[offset + 8 : offset + 20] = struct.pack(">3i", *(round(65536 * x) for x in columns[tag]))
         if tag == b"desc":
-            srgb[offset : offset + size] = srgb[offset : offset + size].replace(
-                "sRGB".encode("utf-16-be"), name.encode("utf-16-be")
-            )
+            old, new = ("sRGB".encode("utf-16-be"), name.encode("utf-16-be"))
+            srgb[offset : offset + size] = srgb[offset : offset + size].replace(old, new)
     return bytes(srgb)
 
 
@@ -58,10 +58,7 @@ def grey_profile() -> bytes:
     """An ICC profile of one channel whose curve is a gamma of 1.8."""
     curve = struct.pack(">4s4xIH2x", b"curv", 1, round(1.8 * 256))
     white = struct.pack(">4s4x3i", b"XYZ ", *(round(65536 * x) for x in (0.9642, 1.0, 0.8249)))
-    texts = [
-        struct.pack(">4s4xI", b"desc", 5) + b"grey\0" + bytes(78 + 1),
-        struct.pack(">4s4x", b"text") + b"none\0" + bytes(3),
-    ]
+    texts = [struct.pack(">4s4xI4s80x", b"desc", 5, b"grey"), struct.pack(">4s4x4s4x", b"text", b"none")]
     body, table = b"", b""
     for tag, data in zip((b"kTRC", b"wtpt", b"desc", b"cprt"), (curve, white, *texts)):
         table += struct.pack(">4sII", tag, 132 + 12 * 4 + len(body), len(data))
@@ -115,7 +112,7 @@ def with_chunk(image: Image.Image, kind: bytes, data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("photo", [np.full((4, 4, 3), 90, np.uint8), np.full((4, 4), 90 * 257, np.uint16)])
-@pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.8, 1.8), (1 / 2.2, None)])
+@pytest.mark.parametrize(("gamma", "exponent"), [(1.0, 1.0), (1 / 1.95, 1.95), (1 / 2.2, None), (1 / 2.5, 2.5)])
 def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, photo, gamma, exponent):
     data = with_chunk(Image.fromarray(photo), b"gAMA", struct.pack(">I", round(1e5 * gamma)))
     (tmp_path / "x.png").write_bytes(data)
@@ -130,9 +127,15 @@ def test_a_stated_gamma_is_brought_to_srgb(tmp_path, capsys, photo, gamma, expon
 FROM_ADOBE = np.array([[1.3983, -0.3983, 0], [0, 1, 0], [0, -0.0429, 1.0429]])
 
 
-@pytest.mark.parametrize("stated", ["EXIF", "cHRM", "cICP"])
-def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, stated):
-    """Adobe RGB as cameras state it and as a PNG's chunks do; Display P3 by its code."""
+# From linear Rec. 2020 to linear Rec. 709 (ITU-R BT.2087).
+FROM_2020 = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])
+CODED = {"P3": (12, FROM_P3), "Rec. 2020": (9, FROM_2020)}
+
+
+@pytest.mark.parametrize("stated", ["EXIF", "cHRM", *CODED])
+def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, monkeypatch, stated):
+    """Adobe RGB as cameras state it and as a PNG's chunks do; others by their codes. In strips of three rows."""
+    monkeypatch.setattr(colours, "ROWS", 3)
     colour, image = np.float32([180, 100, 60]), Image.fromarray(np.full((4, 4, 3), (180, 100, 60), np.uint8))
     path = tmp_path / ("x.jpg" if stated == "EXIF" else "x.png")
     if stated == "EXIF":
@@ -144,13 +147,13 @@ def test_stated_primaries_are_brought_to_srgb(tmp_path, capsys, stated):
         chunk = struct.pack(">8I", 31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000)
         path.write_bytes(with_chunk(image, b"cHRM", chunk))
     else:
-        path.write_bytes(with_chunk(image, b"cICP", bytes((12, 13, 0, 1))))
+        path.write_bytes(with_chunk(image, b"cICP", bytes((CODED[stated][0], 13, 0, 1))))
     light = (colour / 255) ** 2.2 if stated == "EXIF" else srgb_to_linear(colour / 255)
-    light = (FROM_P3 if stated == "cICP" else FROM_ADOBE) @ light
+    light = CODED.get(stated, (0, FROM_ADOBE))[1] @ light
     expected = 255 * linear_to_srgb(light.astype(np.float32))
     assert abs(expected - colour).max() > 8
     for read in (read_colours, read_upright):
-        assert read(path)[2, 2] == pytest.approx(expected, abs=2)
+        assert read(path) == pytest.approx(np.tile(expected, (4, 4, 1)), abs=2)
     assert "primaries that are not sRGB's; they are brought to sRGB" in capsys.readouterr().err
 
 

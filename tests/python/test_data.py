@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 import trimesh
-from blender_data import ANGLE, SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha, sphere_seen
+from blender_data import SIZE, edit, make_blender, make_folders, poses_around, sphere_alpha, sphere_seen
 from layout_scenes import CENTRE, LENS, RADIUS, opencv_points, seen_by_pixels, write_transforms
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
 from splitnerf.data.frames import has_test_split, read_frames
 from splitnerf.data.images import linear_to_srgb, read_image, srgb_to_linear, write_image
 from splitnerf.data.layouts.frame import Frame
-from splitnerf.data.lens import Distortion, read_lens, sample_cubic, undistort
-from splitnerf.data.normalisation import transform_points
+from splitnerf.data.lens import Distortion, pixel_width, read_lens, sample_cubic, undistort
+from splitnerf.data.normalisation import transform_plane, transform_points
 from splitnerf.data.photos import load_photo
 from splitnerf.data.truth import decode_clipped_normals, load_scene_truth, load_view_truths
 from splitnerf.errors import InputError
@@ -34,8 +34,7 @@ def test_blender_layout(scene):
     assert (data.name, len(data), data.images.shape) == ("ball", 12, (12, SIZE, SIZE, 4))
     assert data.images[0].dtype == data.poses.dtype == data.intrinsics.dtype == np.float32
     assert data.frame_names[:2] == ["r_0", "r_1"]
-    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
-    assert data.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
+    assert data.intrinsics[0] == pytest.approx(LENS)
     assert np.array_equal(data.box_from_world, np.eye(4))
     small = load_dataset(scene, "train", downscale=5)
     assert small.images.shape[1:3] == (SIZE // 5, SIZE // 5)
@@ -45,15 +44,14 @@ def test_blender_layout(scene):
 def test_view_folders(tmp_path):
     root = make_folders(tmp_path)
     train, test = load_dataset(root, "train"), load_dataset(root, "test", downscale=2)
-    assert (len(train), test.frame_names) == (12, ["test_009", "test_011"])
-    focal = 0.5 * SIZE / np.tan(0.5 * ANGLE)
-    assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
+    assert (len(train), test.frame_names) == (12, ["test_9", "test_11"])
+    assert train.intrinsics[0] == pytest.approx(LENS)
     poses = poses_around(np.zeros(3), 1.0, 14)
     assert test.world_poses == pytest.approx(np.array(poses[12:]), abs=1e-6)
     assert has_test_split(root)
     normals = np.full((SIZE, SIZE, 3), 0.5 * np.array([0, -0.6, 0.8]) + 0.5)
-    write_image(root / "test_009/normal.png", normals)
-    write_image(root / "test_009/albedo.png", np.full((SIZE, SIZE, 4), [0.5, 0.25, 1, 1]))
+    write_image(root / "test_9/normal.png", normals)
+    write_image(root / "test_9/albedo.png", np.tile([[0.5, 0.25, 1, 1], [0, 1, 0, 0]], (SIZE, SIZE // 2, 1)))
     truth, empty = load_view_truths(test)
     assert empty.normal is None
     centre = SIZE // 4
@@ -76,12 +74,13 @@ def test_normals_of_shiny_blender_are_whole(scene, capsys):
     assert truth.normal_mask[centre, centre] and not truth.normal_mask[0, 0] and told not in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("downscale", [1, 5])
-def test_normals_of_photos_without_alpha_are_scored_on_their_masks(tmp_path, downscale):
-    root = write_transforms(tmp_path, masks=True)
+@pytest.mark.parametrize(("masks", "downscale"), [(True, 1), (True, 5), (False, 5)])
+def test_normals_are_scored_on_masks_or_where_half_of_a_pixel_is_opaque(tmp_path, capsys, masks, downscale):
+    root = write_transforms(tmp_path, masks=masks)
     write_image(root / "images/v08_normal.png", np.tile(linear_to_srgb(np.float32([0.6, 0.48, 0.64])), (SIZE, SIZE, 1)))
     data = load_dataset(root, "test", downscale)
-    assert np.array_equal(load_view_truths(data)[1].normal_mask, data.images[1, ..., 3] > 0.9)
+    assert np.array_equal(load_view_truths(data)[1].normal_mask, data.images[1, ..., 3] > (0.9 if masks else 0.5))
+    assert "the length 1" not in capsys.readouterr().err
 
 
 def test_radiance_a_little_below_0_is_noise(tmp_path):
@@ -91,12 +90,17 @@ def test_radiance_a_little_below_0_is_noise(tmp_path):
     write_image(tmp_path / "a.exr", pixels)
     rgba = load_photo(frame, 1, "object").rgba
     assert not rgba[3, 4, :3].any() and rgba[..., :3].any(axis=-1).sum() == 255
-    write_image(tmp_path / "a.exr", np.where(pixels < 0, 100 * pixels, pixels))
-    with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
-        load_photo(frame, 1, "object")
+    for part, value in ((np.s_[3, 4], -0.06), (np.s_[3, 4:14], -0.04)):  # a tenth of the brightest, a thousandth of all
+        pixels[part] = value
+        write_image(tmp_path / "a.exr", pixels)
+        with pytest.raises(InputError, match="a.exr: has NaN, infinite or negative pixels"):
+            load_photo(frame, 1, "object")
 
 
-def test_far_small_object_is_brought_into_the_box(tmp_path):
+@pytest.mark.parametrize("edge", [100, 16])
+def test_far_small_object_is_brought_into_the_box(tmp_path, monkeypatch, edge):
+    """By silhouettes that may be smaller than the photos."""
+    monkeypatch.setattr("splitnerf.data.photos.SILHOUETTE_SIZE", edge)
     centre, radius = np.array([5.0, -3.0, 2.0]), 0.05
     root = make_blender(tmp_path / "far", centre, radius)
     data = load_dataset(root, "train")
@@ -112,9 +116,11 @@ def test_far_small_object_is_brought_into_the_box(tmp_path):
 def test_another_internal_frame_changes_no_place_in_the_world(tmp_path):
     data = load_dataset(make_blender(tmp_path / "far", (5.0, -3.0, 2.0), 0.05))
     assert data.in_box(data.box_from_world.copy()) is data
-    other = data.in_box(np.diag([2.0, 2, 2, 1]) + 0.5 * np.eye(4, k=3))
+    matrix = np.diag([2.0, 2, 2, 1]) + 0.5 * np.eye(4, k=3)
+    other = data.in_box(matrix)
     assert other.world_poses == pytest.approx(data.world_poses, abs=1e-5)
     assert other.poses[:, 0, 3] == pytest.approx(2 * data.world_poses[:, 0, 3] + 0.5, abs=1e-5)
+    assert transform_plane(matrix, np.array([0.6, 0, 0.8, 3])) == pytest.approx([0.6, 0, 0.8, 2 * 3 + 0.6 * 0.5])
 
 
 def test_fingerprint_tells_scenes_apart_and_not_folders(scene, tmp_path):
@@ -128,11 +134,10 @@ def test_truth_maps(scene):
     shape = (SIZE, SIZE)
     data = load_dataset(scene, "test", downscale=2)
     write_image(scene / "test/r_0_albedo.png", np.full((*shape, 4), [0.5, 0.25, 1, 1]))
-    write_image(scene / "test/r_0_orm.png", np.full((*shape, 4), [1, 0.2, 0.8, 1]))
+    write_image(scene / "test/r_0_orm.png", np.tile([[1, 0.2, 0.8, 1], [1, 0.9, 0.1, 0]], (SIZE, SIZE // 2, 1)))
     coverage = np.ones((*shape, 1))
-    coverage[0] = 0
-    normals = np.concatenate([np.full((*shape, 3), [0, 0.6, 0.8]), coverage], axis=-1)
-    write_image(scene / "test/r_0_normal.exr", normals * coverage)
+    coverage[0], coverage[2] = 0.78, 0.82  # of means below and above 0.9
+    write_image(scene / "test/r_0_normal.exr", np.dstack([coverage * [0, 0.6, 0.8], coverage]))
     write_image(scene / "light.hdr", np.ones((4, 8, 3)))
     trimesh.creation.box().export(scene / "mesh.ply")
     truth, empty = load_view_truths(data)[:2]
@@ -160,17 +165,13 @@ def test_clipped_normals_are_restored_where_one_component_is_unknown():
 
 
 @pytest.mark.parametrize(
-    ("factor", "message"),
-    [(0, "at least 1"), (-2, "at least 1"), (1.5, "whole number"), (SIZE + 1, "too small for downscale")],
+    ("split", "factor", "message"),
+    [("train", 0, "at least 1"), ("train", -2, "at least 1"), ("train", 1.5, "whole number")]
+    + [("train", SIZE + 1, "too small for downscale"), ("val", 1, "no split 'val'")],
 )
-def test_bad_downscale(scene, factor, message):
+def test_bad_choices(scene, split, factor, message):
     with pytest.raises(InputError, match=message):
-        load_dataset(scene, downscale=factor)
-
-
-def test_unknown_split(scene):
-    with pytest.raises(InputError, match="no split 'val'"):
-        load_dataset(scene, "val")
+        load_dataset(scene, split, factor)
 
 
 @pytest.mark.parametrize("name", ["nerf_synthetic_400/chair", "scenes/boombox", "real/moldGoldCape"])
@@ -194,7 +195,10 @@ def test_photos_are_brought_to_one_exposure(tmp_path):
         assert exposure == [0.5, 1.0, 2.0][i % 3]
         inside = found.images[i][found.images[i, ..., 3] > 0.99][:, :3]
         np.testing.assert_allclose(srgb_to_linear(inside), linear / exposure, rtol=0.01)
-    assert found.select([2, 4]).exposures.tolist() == [2.0, 1.0]
+    chosen = found.select([2, 4])
+    assert chosen.exposures.tolist() == chosen.stated.tolist() == [2.0, 1.0] and found.photographed
+    for name in ("images", "poses", "intrinsics"):
+        assert np.array_equal(getattr(chosen, name), getattr(found, name)[[2, 4]])
 
 
 def test_clipped_pixels_of_a_short_exposure_are_known(tmp_path):
@@ -222,10 +226,9 @@ def test_linear_photos_of_floats(tmp_path, peak):
     white = linear_to_srgb((1 / found.exposures).astype(np.float32))
     for i, truth in enumerate(linear):
         inside = truth[..., 3] > 0.4
-        np.testing.assert_allclose(
-            srgb_to_linear(found.images[i][inside][:, :3]), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak
-        )
-        assert (found.images[i][inside][:, :3] < 0.99 * white[i]).all()
+        shown = found.images[i][inside][:, :3]
+        np.testing.assert_allclose(srgb_to_linear(shown), truth[inside][:, :3], rtol=5e-3, atol=1e-4 * peak)
+        assert (shown < 0.99 * white[i]).all()
 
 
 def test_photos_with_the_curve_of_their_camera(tmp_path):
@@ -266,7 +269,9 @@ def pattern(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_a_bent_photo_is_as_a_pinhole_takes_it(name):
+def test_a_bent_photo_is_as_a_pinhole_takes_it(name, monkeypatch):
+    """In strips of seven rows."""
+    monkeypatch.setattr("splitnerf.data.lens.STRIP", 7 * WIDTH)
     k = LENSES[name]
     photo = pattern(*seen_by_pixels(k, CAMERA, HEIGHT, WIDTH)).astype(np.float32)
     straight, known = undistort(photo, distortion(k), np.array(CAMERA))
@@ -299,7 +304,8 @@ def test_quadratic_functions_are_met_exactly_between_pixels():
 def test_a_polynomial_that_folds_back_shows_no_second_image():
     """1 - 1.5 r^2 grows up to r = 0.4714, and is back in the photo's middle at r = 0.8."""
     lens = Distortion((-1.5, 0.0, 0.0, 0.0))
-    assert lens.reach == pytest.approx(np.sqrt(1 / 4.5))
+    for i, power in enumerate((3, 5, 7, 9)):  # x - x^power / power has its top at 1
+        assert Distortion(tuple(-np.eye(4)[i] / power)).reach == pytest.approx(1)
     _, known = undistort(np.ones((HEIGHT, WIDTH, 1), np.float32), lens, np.array([100.0, 100, 65, 45]))
     row, column = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     r = np.hypot(column - 65, row - 45) / 100
@@ -357,11 +363,15 @@ def test_a_frame_may_have_a_lens_of_its_own(tmp_path):
     assert by_name["v04"].distortion == Distortion((0.9, 0, 0, 0)) == by_name["v05"].distortion
     assert by_name["v03"].lens["fl_y"] == 2 * LENS[0]  # the file's pixels are square, at another focal length
     assert by_name["v05"].lens["camera_angle_x"] == 0.7 and "fl_x" not in by_name["v05"].lens
+    for value in (True, False, 1, 0):
+        assert read_lens({"fl_x": 9, "k1": 0.1, "is_fisheye": value}, "x")[1].fisheye == value
 
 
-@pytest.mark.parametrize("value", [True, False, 1, 0])
-def test_a_number_says_that_a_lens_is_a_fisheye(value):
-    assert read_lens({"fl_x": 9, "k1": 0.1, "is_fisheye": value}, "x")[1].fisheye == value
+def test_the_width_of_a_pixel_is_a_median():
+    poses, lenses = np.tile(np.eye(4), (3, 1, 1)), np.float32([[10, 99, 5, 5]] * 3)
+    poses[:, 2, 3] = 1, 2, 9
+    for nearest, width in ((0.0, 2 / 10), (3.0, 3 / 10)):
+        assert pixel_width(poses, lenses, np.zeros(3), nearest=nearest) == pytest.approx(width)
 
 
 def test_zeros_bend_nothing(tmp_path):

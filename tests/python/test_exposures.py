@@ -172,9 +172,10 @@ class TestRun:
         np.testing.assert_allclose(exposed.exposures, list(stored.values()))
         np.testing.assert_allclose(np.log(exposed.exposures).mean(0), math.log(6) / 3, atol=1e-5)
         assert main(["evaluate", str(run), "--data", str(data), "--spp", "1"]) == 0
-        (run / EXPOSURES).write_text(json.dumps({"exposures": {"other": [1, 1, 1]}}))
-        with pytest.raises(InputError, match="is not of these photos"):
-            with_exposures(views, run)
+        for bad in ({"other": [1, 1, 1]}, dict.fromkeys(stored, [1, 0, 1])):
+            (run / EXPOSURES).write_text(json.dumps({"exposures": bad}))
+            with pytest.raises(InputError, match="is not of these photos"):
+                with_exposures(views, run)
         capsys.readouterr()
         error = refused(capsys, "refine", run, "--data", data, "--out", tmp_path / "again", "--sweeps", "1")
         assert "is not of these photos" in error

@@ -39,15 +39,15 @@ def test_nodes_translate_turn_scale_in_that_order_down_the_tree(path):
     gltf = Gltf()
     mesh = gltf.mesh(gltf.primitive(NORMAL=[[0, 0, 1]] * 3))
     child = gltf.node(root=False, mesh=mesh, scale=[2, 3, 4], rotation=[0, 0, np.sqrt(0.5), np.sqrt(0.5)])
-    matrix = np.eye(4)
-    matrix[:3, 3] = [10, 20, 30]
-    gltf.node(children=[child], matrix=matrix.T.ravel().tolist())
+    middle = gltf.node(root=False, children=[child], matrix=[*np.eye(4).flat[:12], 10, 20, 30, 1])  # by columns
+    gltf.node(children=[middle], rotation=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
     asset = read_asset(gltf.write(path))
-    # Scaled, then a quarter turn about z of the file takes (x, y) to (-y, x), then moved.
+    # Scaled, then a quarter turn about z of the file takes (x, y) to (-y, x), then moved; one about x takes y up to z there.
     expected = TRIANGLE * [2, 3, 4]
     expected = np.stack([-expected[:, 1], expected[:, 0], expected[:, 2]], axis=1) + [10, 20, 30]
+    expected = np.stack([expected[:, 0], -expected[:, 2], expected[:, 1]], axis=1)
     assert asset.vertices == pytest.approx(z_up(expected), abs=1e-5)
-    assert asset.normals == pytest.approx(np.tile([0, -1, 0], (3, 1)), abs=1e-6)  # +z of the file
+    assert asset.normals == pytest.approx(np.tile([0, 0, -1], (3, 1)), abs=1e-6)  # -y of the file
 
 
 def test_instances_repeat_and_a_mirrored_one_still_faces_outward(path):
@@ -104,13 +104,15 @@ def test_skin_stands_in_its_rest_pose(path, capsys):
     gltf = Gltf()
     primitive = gltf.primitive(NORMAL=[[0, 0, 1]] * 3)
     primitive["attributes"]["JOINTS_0"] = gltf.accessor([[0, 1, 0, 0]] * 3, "uint8")
-    primitive["attributes"]["WEIGHTS_0"] = gltf.accessor([[1, 0, 0, 0], [0, 1, 0, 0], [0.5, 0.5, 0, 0]])
-    joints = [gltf.node(translation=[0, 0, 2]), gltf.node(translation=[0, 4, 0])]
-    gltf.json["skins"] = [{"joints": joints}]
+    primitive["attributes"]["WEIGHTS_0"] = gltf.accessor([[2, 0, 0, 0], [0, 1, 0, 0], [0.5, 0.5, 0, 0]])
+    joints = [gltf.node(translation=[0, 0, 2], scale=[3, 3, 3]), gltf.node(translation=[0, 4, 0])]
+    bind = gltf.accessor([(np.eye(4) + 1 * np.eye(4, k=3)).T, np.eye(4)])  # by columns: the first moves by 1 along x
+    gltf.json["skins"] = [{"joints": joints, "inverseBindMatrices": bind}]
     gltf.node(mesh=gltf.mesh(primitive), skin=0, translation=[100, 0, 0])  # without effect, as glTF prescribes
     asset = read_asset(gltf.write(path))
-    moved = TRIANGLE + [[0, 0, 2], [0, 4, 0], [0, 2, 1]]
-    assert asset.vertices == pytest.approx(z_up(moved), abs=1e-6)
+    first, second = 3 * (TRIANGLE + [1, 0, 0]) + [0, 0, 2], TRIANGLE + [0, 4, 0]
+    moved = [first[0], second[1], (first[2] + second[2]) / 2]
+    assert asset.vertices == pytest.approx(z_up(np.array(moved)), abs=1e-6)
     assert "has a skin; drawn in its rest pose" in capsys.readouterr().err
 
 
@@ -191,12 +193,13 @@ def test_texture_transform_and_second_set(path):
     # The extension's order: scaled by (2, 3), turned a quarter counter-clockwise with v downward, moved.
     gltf = Gltf()
     transform = {"scale": [2, 3], "rotation": np.pi / 2, "offset": [0.1, 0.2], "texCoord": 1}
-    slot = {"index": gltf.texture(np.ones((2, 2, 3))), "extensions": {"KHR_texture_transform": transform}}
+    slot = {"index": gltf.texture(np.ones((2, 2, 1))), "extensions": {"KHR_texture_transform": transform}}
     material = gltf.material(pbrMetallicRoughness={"baseColorTexture": slot})
     part = gltf.primitive(material=material, NORMAL=[[0, 0, 1]] * 3, TEXCOORD_0=TRIANGLE_UV * 0, TEXCOORD_1=TRIANGLE_UV)
     gltf.node(mesh=gltf.mesh(part))
     gltf.json["extensionsRequired"] = ["KHR_texture_transform"]
     asset = read_asset(gltf.write(path))
+    assert np.array_equal(asset.materials[0].albedo_texture, np.ones((2, 2, 3)))  # grey is repeated
     scaled = TRIANGLE_UV * [2, 3]
     assert asset.uv == pytest.approx(np.stack([scaled[:, 1], -scaled[:, 0]], axis=1) + [0.1, 0.2], abs=1e-6)
 
@@ -232,11 +235,14 @@ def test_repairs_are_said(path, capsys):
     assert "the colours of 'old', specular and glossiness, are not read; drawn as white metal" in said
     gltf = Gltf()
     clear = {"KHR_materials_transmission": {}}  # which the file does not declare
-    material = gltf.material(name="glass", alphaMode="BLEND", extensions=clear)
+    extra = {"emissiveFactor": [0.25, 0, 0.5], "pbrMetallicRoughness": {"metallicFactor": -0.5}}
+    material = gltf.material(name="glass", alphaMode="BLEND", extensions=clear, **extra)
     colours = gltf.accessor([[255, 0, 0, 255]] * 3, "uint8")  # not normalised
     gltf.node(mesh=gltf.mesh(gltf.primitive(material=material, COLOR_0=colours)))
-    read_asset(gltf.write(path))
+    (read,) = read_asset(gltf.write(path)).materials
+    assert (read.emission, read.roughness, read.metallic) == ((0.25, 0, 0.5), 1, 0)  # of no strength: as it is
     said = capsys.readouterr().err
+    assert "material 'glass' has a factor outside [0, 1]; clipped" in said
     assert "material 'glass' is transparent (alphaMode BLEND); drawn opaque" in said
     assert "uses KHR_materials_transmission; left out" in said
     assert "mesh 'part' has vertex colours outside [0, 1]; clipped" in said
@@ -263,13 +269,11 @@ def test_a_buffer_that_nothing_uses_may_be_missing(path):
 def test_a_file_that_needs_more_memory_than_there_is_is_refused(path, monkeypatch):
     """3 + 3 values of 40 bytes, of half of what is available."""
     triangle().write(path)
-    for available, fits in ((1 << 16, True), (2 * 40 * 8, False)):
-        monkeypatch.setattr(document, "memory_bytes", lambda: (1 << 40, available))
-        if fits:
-            read_asset(path)
-        else:
-            with pytest.raises(InputError, match="needs more than half of the available memory"):
-                read_asset(path)
+    monkeypatch.setattr(document, "memory_bytes", lambda: (1 << 40, 1 << 16))
+    read_asset(path)
+    monkeypatch.setattr(document, "memory_bytes", lambda: (1 << 40, 2 * 40 * 8))
+    with pytest.raises(InputError, match="needs more than half of the available memory"):
+        read_asset(path)
 
 
 def test_the_pixels_of_a_texture_cost_more_before_they_are_unpacked():

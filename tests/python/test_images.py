@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from blender_data import directions_of_map, write_exr
 from PIL import Image
-from splitnerf.data import images
+from scipy.spatial.transform import Rotation
+from splitnerf.data import environment, images
 from splitnerf.data.environment import read_environment, rotate_environment, sample_environment
 from splitnerf.data.images import write_image
 from splitnerf.data.pixels import averaged_codes
@@ -21,12 +22,19 @@ def test_levels_survive_a_png_exactly(tmp_path, channels):
     levels[:2, :, 3:] = [[[0]], [[1]]]
     images.write_image(tmp_path / "a.png", levels / 255)
     assert np.array_equal(images.to_uint8(images.read_image(tmp_path / "a.png")), levels)
+    assert images.to_uint8(np.array([-0.1, 1.2])).tolist() == [0, 255]
+    # Columns of a JPEG keep their own colours.
+    stripes = np.tile([[1.0, 0, 0], [0, 0, 1]], (16, 8, 1))
+    images.write_image(tmp_path / "a.jpg", stripes)
+    assert np.abs(images.read_image(tmp_path / "a.jpg") - stripes).max() < 0.1
 
 
 def test_exr_is_exact_and_hdr_within_its_mantissa(tmp_path):
     radiance = np.exp(np.random.default_rng(1).normal(0, 2, (8, 16, 3))).astype(np.float32)
     images.write_image(tmp_path / "a.exr", radiance)
     assert np.array_equal(images.read_radiance(tmp_path / "a.exr"), radiance)
+    images.write_image(tmp_path / "half.exr", np.full((2, 2, 3), 2049.0), half=True)
+    assert (images.read_image(tmp_path / "half.exr") == 2048).all()  # of 11 bits
     images.write_image(tmp_path / "a.hdr", radiance)
     error = np.abs(images.read_radiance(tmp_path / "a.hdr") - radiance)
     assert (error <= radiance.max(axis=-1, keepdims=True) / 128).all()
@@ -54,20 +62,21 @@ def test_photos_are_averaged_to_a_step_of_16_bits(dtype, factor):
     of_object = images.area_average(linear * alpha, factor) / np.maximum(coverage, 1e-8)
     np.testing.assert_allclose(weighed[..., :3] / 65535, images.linear_to_srgb(of_object), atol=1.6e-5)
     np.testing.assert_allclose(weighed[..., 3:] / 65535, coverage, atol=1.6e-5)
-    np.testing.assert_allclose(
-        alike[..., :3] / 65535, images.linear_to_srgb(images.area_average(linear, factor)), atol=1.6e-5
-    )
+    of_all = images.linear_to_srgb(images.area_average(linear, factor))
+    np.testing.assert_allclose(alike[..., :3] / 65535, of_all, atol=1.6e-5)
     assert np.array_equal(weighed[..., 3], alike[..., 3]) and weighed[0, 0].tolist() == [0] * 4
     assert averaged_codes(codes, 1) is codes
 
 
 def test_write_rejects_what_it_cannot_store(tmp_path):
-    with pytest.raises(ValueError, match="unknown image format"):
-        images.write_image(tmp_path / "a.bmp", np.ones((2, 2, 3)))
-    with pytest.raises(ValueError, match="finite"):
-        images.write_image(tmp_path / "a.png", np.full((2, 2, 3), np.nan))
-    with pytest.raises(ValueError, match=r"\[H, W"):
-        images.write_image(tmp_path / "a.png", np.ones((2, 2, 5)))
+    nan, wide = np.full((2, 2, 3), np.nan), np.ones((2, 2, 5))
+    for name, pixels, told in (
+        ("a.bmp", nan + 1, "unknown image f"),
+        ("a.png", nan, "finite"),
+        ("a.png", wide, "H, W"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            images.write_image(tmp_path / name, pixels)
     assert not list(tmp_path.iterdir())
 
 
@@ -83,6 +92,7 @@ def test_texels_are_met_at_their_directions_and_blend_between(tmp_path):
     assert np.array_equal(read_environment(tmp_path / "a.exr"), radiance)
     towards = directions_of_map(8)
     assert sample_environment(radiance, 7 * towards) == pytest.approx(radiance, abs=1e-5)
+    assert np.array_equal(environment.texels_of_directions(7 * towards.reshape(-1, 3), 8), np.arange(8 * 16))
     # Half a texel on: the mean of neighbours, across the seam too (the last column's neighbour is the first).
     half = rotate_z(towards, -np.pi / 16)
     expected = 0.5 * (radiance + np.roll(radiance, -1, axis=1))
@@ -98,13 +108,28 @@ def rotate_z(vectors, angle):
 
 def test_a_quarter_turn_of_light_is_a_quarter_turn_of_columns():
     radiance = np.random.default_rng(1).random((4, 8, 3), np.float32)
-    assert np.array_equal(rotate_environment(radiance, 90), np.roll(radiance, -2, axis=1))
-    assert np.array_equal(rotate_environment(radiance, -90), np.roll(radiance, 2, axis=1))
-    assert np.array_equal(rotate_environment(radiance, 360), radiance)
+    for degrees, columns in ((90, -2), (-90, 2), (360, 0)):
+        assert np.array_equal(rotate_environment(radiance, degrees), np.roll(radiance, columns, axis=1))
     # What came from d comes from d turned counter-clockwise.
     towards = directions_of_map(4)
     turned = sample_environment(rotate_environment(radiance, 90), rotate_z(towards, np.pi / 2))
     assert turned == pytest.approx(radiance, abs=1e-5)
+
+
+def test_light_is_turned_into_another_world():
+    """Of a map that shows 2 plus the direction: what a texel shows is the direction in the map's world."""
+    towards, turn = directions_of_map(32), Rotation.from_rotvec([0.4, -0.9, 1.3]).as_matrix()
+    turned = environment.turn_environment((2 + towards).astype(np.float32), turn)
+    assert turned == pytest.approx(2 + towards @ turn.T, abs=0.01)
+
+
+def test_what_is_not_known_of_the_surroundings_has_no_part():
+    """The horizon lies between a row of them and one that is known."""
+    surroundings = np.full((16, 32, 4), [9, 9, 9, 0], np.float32)
+    surroundings[8:] = [0.2, 0.4, 0.8, 1.0]
+    radiance, known = environment.seen_at(surroundings, np.array([[0, 0, -1.0], [0, 0, 1], [0.8, 0.6, 0]]))
+    assert known == pytest.approx([1, 0, 0.5]) and not radiance[1].any()
+    assert radiance[[0, 2]] == pytest.approx(np.tile([0.2, 0.4, 0.8], (2, 1)))
 
 
 def test_a_turn_between_columns_keeps_each_row_and_moves_smoothly():

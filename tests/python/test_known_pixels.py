@@ -38,28 +38,29 @@ def ignoring_scene(root):
     return root
 
 
-def notes(capsys) -> str:
-    return capsys.readouterr().err
-
-
 # ---- what masks mean ----
 
 
-def test_masks_of_the_object_are_told_by_their_look(tmp_path, capsys):
-    data = load_dataset(write_transforms(tmp_path, masks=True))
-    assert data.known is None and 0.3 < data.images[..., 3].mean() < 0.5
+@pytest.mark.parametrize(("radius", "share"), [(RADIUS, 39), (1.35 * RADIUS, 76)])
+def test_masks_of_the_object_are_told_by_their_look(tmp_path, capsys, radius, share):
+    """Though they cover most of a photo, where they leave its edge."""
+    write_transforms(tmp_path, masks=True)
+    for i, pose in enumerate(sphere_poses()):
+        write_image(tmp_path / f"masks/v{i:02d}.png.png", sphere_alpha(pose, CENTRE, radius))
+    data = load_dataset(tmp_path)
+    assert data.known is None and data.images[..., 3].mean() == pytest.approx(share / 100, abs=0.006)
     load_dataset(tmp_path, "test")
-    said = notes(capsys)
+    said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert f"{tmp_path}: its mask files are taken for the object's, which covers 39% of the photos" in said
+    assert f"{tmp_path}: its mask files are taken for the object's, which covers {share}% of the photos" in said
 
 
 def test_masks_that_are_nowhere_white_are_said(tmp_path, capsys):
     root = write_transforms(tmp_path, masks=True)
-    faint = sphere_alpha(sphere_poses()[1], CENTRE, RADIUS) * np.linspace(0.6, 0.8, SIZE)
+    faint = sphere_alpha(sphere_poses()[1], CENTRE, RADIUS) * np.linspace(0.6, 2, SIZE).clip(0, 0.97)
     write_image(root / "masks/v01.png.png", faint)
     load_dataset(root)
-    assert "masks that are nowhere white make the object clear (v01.png.png: " in notes(capsys)
+    assert "masks that are nowhere white make the object clear (v01.png.png: 96.9%)" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", ["object", "auto"])
@@ -70,16 +71,23 @@ def test_a_mask_that_is_white_everywhere_leaves_the_alpha(tmp_path, capsys, kind
         write_image(root / f"masks/v{i:02d}.png", np.ones((SIZE, SIZE)))
         edit(root, lambda meta, i=i: meta["frames"][i].update(mask_path=f"masks/v{i:02d}.png"), "transforms.json")
     assert np.array_equal(load_dataset(root).images, expected.images)
-    assert "where a mask is white everywhere the photo's own alpha counts (v" in notes(capsys)
+    assert "where a mask is white everywhere the photo's own alpha counts (v" in capsys.readouterr().err
 
 
 def test_masks_that_keep_nearly_all_say_what_to_ignore(tmp_path, capsys):
     data, plain = load_dataset(ignoring_scene(tmp_path)), load_dataset(write_transforms(tmp_path / "plain"))
-    assert "its mask files are taken to ignore what is black, as they keep" in notes(capsys)
+    assert "its mask files are taken to ignore what is black, as they keep 95% of the photos" in capsys.readouterr().err
     known = np.stack([passer_by(i) > 0 for i in range(COUNT) if i % 8])
     assert np.array_equal(data.known, known)
     assert np.array_equal(data.images, plain.images * known[..., None])
     assert np.array_equal(load_dataset(tmp_path, "test").known, np.stack([passer_by(0), passer_by(8)]) > 0)
+    for i in range(COUNT):  # 65% of a photo, and 57% of its edge
+        write_image(tmp_path / f"masks/m{i}.png", np.float32([np.arange(SIZE) >= 17] * SIZE))
+    assert load_dataset(tmp_path).known.mean() == pytest.approx(31 / 48)
+    assert "to ignore what is black, as they keep 65% of the photos" in capsys.readouterr().err
+    write_image(tmp_path / "masks/m3.png", np.zeros((SIZE, SIZE)))
+    with pytest.raises(InputError, match="v03.png: its masks ignore all of it; remove the frame"):
+        load_dataset(tmp_path)
 
 
 def test_masks_that_contradict_the_poses_are_no_objects(tmp_path, capsys):
@@ -90,7 +98,7 @@ def test_masks_that_contradict_the_poses_are_no_objects(tmp_path, capsys):
         kept[:, (3 * i) % 32 : (3 * i) % 32 + 16] = 1
         write_image(root / f"masks/m{i}.png", kept)
     data = load_dataset(root)
-    assert "taken to ignore what is black, as masks of the object would contradict the poses" in notes(capsys)
+    assert "taken to ignore what is black, as masks of the object would contradict the poses" in capsys.readouterr().err
     assert data.known.mean() == pytest.approx(1 / 3)
     with pytest.raises(InputError, match="masks and poses contradict each other"):
         load_dataset(root, reading=OBJECT)
@@ -106,7 +114,7 @@ def test_an_option_settles_what_masks_mean(tmp_path, capsys):
     assert wide.known is None and wide.images[..., 3].sum() > 1.2 * own.images[..., 3].sum()
     assert np.array_equal(known.known, wide.images[..., 3] > 0.5)
     assert np.array_equal(known.images, own.images * known.known[..., None])
-    assert "mask files" not in notes(capsys)
+    assert "mask files" not in capsys.readouterr().err
 
 
 def test_a_file_settles_what_its_masks_mean(tmp_path, capsys):
@@ -117,7 +125,7 @@ def test_a_file_settles_what_its_masks_mean(tmp_path, capsys):
     assert data.known is None and np.array_equal(data.images[0, ..., 3], passer_by(1))
     edit(root, lambda m: m.update(mask_kind="ignore"), "transforms.json")
     assert np.array_equal(load_dataset(root).known[0], passer_by(1) > 0)
-    assert "mask files" not in notes(capsys)
+    assert "mask files" not in capsys.readouterr().err
 
 
 def test_photos_need_a_mask_of_the_object(tmp_path):
@@ -130,7 +138,8 @@ def test_photos_need_a_mask_of_the_object(tmp_path):
         load_dataset(root)
 
 
-def test_dynamic_masks_are_white_where_they_ignore(tmp_path):
+def test_dynamic_masks_are_white_where_they_ignore(tmp_path, monkeypatch):
+    monkeypatch.setattr("splitnerf.data.photos.SILHOUETTE_SIZE", 16)
     root = write_transforms(tmp_path, masks=True)
     for i in range(0, COUNT, 2):
         write_image(root / f"images/dynamic_mask_v{i:02d}.png", 1 - passer_by(i))
@@ -139,13 +148,10 @@ def test_dynamic_masks_are_white_where_they_ignore(tmp_path):
         i = int(name[1:])
         assert np.array_equal(known, passer_by(i) > 0 if i % 2 == 0 else np.ones((SIZE, SIZE), bool))
     assert not data.images[~data.known].any() and data.images[..., 3].mean() > 0.25
-
-
-def test_a_photo_of_which_nothing_is_known_is_refused(tmp_path):
-    root = ignoring_scene(tmp_path)
-    write_image(root / "masks/m3.png", np.zeros((SIZE, SIZE)))
-    with pytest.raises(InputError, match="v03.png: its masks ignore all of it; remove the frame"):
-        load_dataset(root)
+    assert np.array_equal(data.select([1, 0]).known, data.known[[1, 0]])
+    both = ignoring_scene(tmp_path / "both")
+    write_image(both / "images/dynamic_mask_v01.png", 1 - passer_by(4))
+    assert np.array_equal(load_dataset(both).known[0], passer_by(1) * passer_by(4) > 0)
 
 
 @pytest.mark.parametrize("factor", [2, 5])
@@ -158,12 +164,14 @@ def test_a_coarser_pixel_is_known_where_all_of_it_is(tmp_path, factor):
     assert not data.images[~data.known].any()
 
 
-def test_runs_are_not_resumed_with_other_known_pixels(tmp_path):
+def test_runs_are_not_resumed_with_other_data(tmp_path):
     data = load_dataset(ignoring_scene(tmp_path))
     other = data.known.copy()
     other[0, 0, 30:] = False  # where the photo is empty in any case
-    changed = dataclasses.replace(data, known=other)
-    assert len({dataset_fingerprint(d) for d in (data, changed, dataclasses.replace(data, known=None))}) == 3
+    turns = np.tile(np.eye(3), (len(data), 1, 1))
+    changes = [{}, {"known": other}, {"known": None}, {"ground": np.ones(4)}, {"light_turns": turns}]
+    changes += [{"intrinsics": 1.1 * data.intrinsics}, {"split": "test"}]
+    assert len({dataset_fingerprint(dataclasses.replace(data, **x)) for x in changes}) == len(changes)
 
 
 # ---- who must not use unknown pixels ----
@@ -179,8 +187,7 @@ def halved(is_half):
     poses = np.float32(sphere_poses())
     alpha = np.stack([sphere_alpha(pose, CENTRE, RADIUS) for pose in sphere_poses()])
     known = np.ones(alpha.shape, bool)
-    for i in range(len(known)):
-        known[i, :, : SIZE // 2] = not is_half(i)
+    known[:, :, : SIZE // 2] = [[[not is_half(i)]] for i in range(COUNT)]
     images = np.float32(np.stack([np.full_like(alpha, 0.5)] * 3 + [alpha], axis=-1) * known[..., None])
     lenses, names = np.tile(np.float32(LENS), (COUNT, 1)), [str(i) for i in range(COUNT)]
     return Dataset("half", None, "train", 1, images, poses, lenses, names, [], np.eye(4), known)
@@ -232,10 +239,8 @@ def test_refinement_reads_known_pixels_only(half_known):
 def test_scores_are_over_known_pixels(half_known):
     """A prediction that is right where a photo knows anything, and wrong by 0.1 elsewhere."""
     data = half_known
-    predictions = [
-        {"rgb": np.where(k[..., None], i[..., :3], 0.6), "alpha": np.where(k, i[..., 3], 1.0)}
-        for i, k in zip(data.images, data.known)
-    ]
+    whole = [np.where(k[..., None], i, [0.6, 0.6, 0.6, 1]) for i, k in zip(data.images, data.known)]
+    predictions = [{"rgb": image[..., :3], "alpha": image[..., 3]} for image in whole]
     truths = [ViewTruth() for _ in data.frame_names]
     scores = evaluate_maps(predictions, data, truths)["novel_view"]
     assert scores["psnr"] == 100 and scores["ssim"] == pytest.approx(1)
@@ -260,15 +265,24 @@ def test_parallel_axes_rounded_to_float32():
 
 
 def test_parallel_cameras_find_the_object_by_the_masks():
-    """It is not at the origin, so that the axes alone do not say how far away it is."""
+    """It is not at the origin, so that the axes alone do not say how far away it is; pixels are half as wide as high."""
     centre, radius = np.array([0.0, 0.0, -9.0]), 0.5
     poses = [np.eye(4) for _ in range(12)]
     for i, pose in enumerate(poses):
         pose[:3, 3] = [0.8 * np.cos(i), 0.8 * np.sin(2 * i), 0.01 * i]
-    masks = np.stack([sphere_alpha(pose, centre, radius) for pose in poses]) > 0.5
-    box = estimate_box(masks, np.stack(poses), np.tile(LENS, (12, 1)))
+    masks = np.repeat([sphere_alpha(pose, centre, radius) > 0.5 for pose in poses], 2, axis=2)
+    box = estimate_box(masks, np.stack(poses), np.tile(LENS, (12, 1)) * [2, 1, 2, 1])
     inside = box[:3, :3] @ centre + box[:3, 3]
     assert np.linalg.norm(inside) < 0.7 and 0.1 < box[0, 0] * radius <= 1.0
+
+
+@pytest.mark.parametrize(("radius", "kept"), [(0.3, False), (0.45, True), (1.2, True), (1.5, False)])
+def test_an_object_about_as_large_as_the_box_stays_where_it_is(radius, kept):
+    """Though one mask of twenty is empty; pixels are half as wide as high."""
+    poses = np.array(sphere_poses(20))
+    masks = np.repeat([sphere_alpha(pose, CENTRE, RADIUS) > 0.5 for pose in poses], 2, axis=2)
+    masks[7], poses[:, :3, 3] = False, radius * poses[:, :3, 3]
+    assert np.array_equal(estimate_box(masks, poses, np.tile(LENS, (20, 1)) * [2, 1, 2, 1]), np.eye(4)) == kept
 
 
 @pytest.mark.parametrize("masked", [True, False])
@@ -318,13 +332,16 @@ def test_an_origin_far_away_is_brought_near(tmp_path):
     survey = np.array([447_012.5, 5_411_003.0, 212.0])
     near = load_dataset(write_transforms(tmp_path / "near"))
     root = write_transforms(tmp_path / "far")
-    moved = np.zeros((4, 4))
-    moved[:3, 3] = survey
+    moved = np.pad(survey[:, None], ((0, 1), (3, 0)))
     for i in range(COUNT):
         edit(root, set_pose(i, lambda pose: (pose + moved).tolist()), "transforms.json")
     write_ground(root, np.array([0, 0.6, 0.8, survey @ [0, 0.6, 0.8]]))
-    far, test = load_dataset(root), load_dataset(root, "test")
+    found = Reading(separated=tmp_path / "found")
+    write_ground(found.separated, np.array([0, 0.6, 0.8, 5]))  # which training found, from the near origin
+    far, test = load_dataset(root, reading=found), load_dataset(root, "test")
     assert far.ground[3] == pytest.approx((survey - far.origin) @ [0, 0.6, 0.8], abs=1e-6)
+    (root / "ground.json").unlink()
+    assert load_dataset(root, reading=found).ground[3] == 5
     assert np.array_equal(far.origin, test.origin) and np.array_equal(far.origin, np.round(far.origin / 10) * 10)
     assert far.world_poses[:, :3, 3] + far.origin == pytest.approx(near.world_poses[:, :3, 3] + survey, abs=1e-4)
     assert np.abs(far.origin - survey).max() < 10 and np.abs(far.world_poses[:, :3, 3]).max() < 20

@@ -1,6 +1,7 @@
 """Layouts are recognised by themselves, the same cameras come out of each, and a run holds out what it was asked to."""
 
 import json
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, writ
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
-from splitnerf.data.frames import has_test_split, read_frames
+from splitnerf.data.frames import far_origin, has_test_split, read_frames
 from splitnerf.data.images import write_image
 from splitnerf.data.json_files import write_json
 from splitnerf.data.layouts import colmap, transforms
+from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
@@ -39,14 +41,16 @@ def test_the_same_cameras_come_out_of_each_layout(tmp_path, name):
     assert load_dataset(tmp_path, "test").frame_names == ["v00", "v08"] and has_test_split(tmp_path)
     np.testing.assert_allclose(data.world_poses, poses, atol=1e-6)
     np.testing.assert_allclose(data.intrinsics, np.broadcast_to(LENS, (len(data), 4)), rtol=1e-5)
-    assert data.known is None and not data.origin.any()
+    assert data.known is None and not data.origin.any() and data.photographed == (name == "transforms with masks")
     for pose, image in zip(poses, data.images):
         assert np.array_equal(image[..., 3] > 0.5, sphere_alpha(pose, CENTRE, RADIUS) > 0.5)
 
 
 def test_a_transforms_file_counts_before_the_model_it_was_made_of(tmp_path):
+    """Also with a byte order mark."""
     write_colmap(tmp_path, binary=True)
-    write_transforms(tmp_path, fl_x=2 * FOCAL)
+    path = write_transforms(tmp_path, fl_x=2 * FOCAL) / "transforms.json"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     assert load_dataset(tmp_path).intrinsics[0, 0] == pytest.approx(2 * FOCAL)
 
 
@@ -58,14 +62,6 @@ def test_of_two_forms_of_a_model_the_binary_one_is_read(tmp_path, capsys, remove
         (root / "sparse/0" / name).unlink()
     assert load_dataset(tmp_path).intrinsics[0, 0] == focal
     assert ("files of both forms; cameras.bin and images.bin are read" in capsys.readouterr().err) == (not removed)
-
-
-def test_masks_of_colmap_are_found_by_both_names(tmp_path):
-    root = write_colmap(tmp_path, binary=True, masks=True)
-    for i in range(0, COUNT, 2):
-        (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/v{i:02d}.png")
-    frames, _ = read_frames(root, "train")
-    assert all(frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.name) for frame in frames)
 
 
 @pytest.mark.parametrize("folder", ["absolute", "../images", "cam"])
@@ -93,14 +89,16 @@ def test_masks_of_colmap_are_found_from_paths(tmp_path, capsys, folder):
 
 
 def test_masks_of_colmap_are_found_by_other_forms_of_their_names(tmp_path):
-    """A letter with an accent, composed in the model and decomposed in the file system."""
+    """Without the photo's suffix; a letter with an accent, composed in the model and decomposed in the file system."""
     root = write_colmap(tmp_path, binary=False, masks=True)
     (model,) = root.rglob("images.txt")
     model.write_text(model.read_text().replace("v00.png", "\u00e9.png"))
     (root / "images/v00.png").rename(root / "images/e\u0301.png")
     (root / "masks/v00.png.png").rename(root / "masks/e\u0301.png.png")
-    frames, _ = read_frames(root, "train")
-    assert all(frame.mask_path.is_file() for frame in frames)
+    for i in range(1, COUNT, 2):
+        (root / f"masks/v{i:02d}.png.png").rename(root / f"masks/v{i:02d}.png")
+    for frame in read_frames(root, "train", Reading("all"))[0]:
+        assert frame.mask_path.is_file() and frame.mask_path.name.startswith(frame.image_path.stem)
 
 
 @pytest.mark.parametrize("binary", [True, False])
@@ -202,12 +200,6 @@ def test_one_frame_is_held_out_and_none_is_left(tmp_path):
 # ---- files of the data ----
 
 
-def test_a_byte_order_mark_is_no_damage(tmp_path):
-    path = write_transforms(tmp_path) / "transforms.json"
-    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
-    assert len(load_dataset(tmp_path)) == COUNT - 2
-
-
 def test_files_outside_of_the_folder_are_read_and_named_once(tmp_path, capsys):
     root = write_transforms(tmp_path / "data", masks=True)
     (root / "images").rename(tmp_path / "images")
@@ -231,22 +223,16 @@ def test_what_is_no_image_stays_unread(tmp_path, name):
 
 def test_a_file_without_permission_is_not_called_damaged(tmp_path, monkeypatch):
     root = write_transforms(tmp_path)
-
-    def refuse(*_, **__):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("pathlib.Path.read_text", refuse)
+    monkeypatch.setattr("pathlib.Path.read_text", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(InputError, match=r"transforms.json: cannot be read \(Permission denied\)"):
         load_dataset(root)
-
-
-# ---- damage ----
 
 
 WIDE = {"fl_x": 100, "fl_y": 80, "cx": 60, "cy": 30, "w": 120, "h": 60}
 FRAMES = [  # the file, the frame, and fx, fy, cx, cy of a photo of the frame's own size; None where it is refused
     (WIDE, {}, (120, 60), (100, 80, 60, 30)),
     (WIDE, {"fl_x": 50}, (120, 60), (50, 40, 60, 30)),
+    (WIDE, {"fl_y": 40}, (120, 60), (50, 40, 60, 30)),
     ({"fl_y": 80}, {"fl_x": 50}, (120, 60), (50, 80, 60, 30)),
     ({"fl_x": 80}, {"fl_x": 50}, (120, 60), (50, 50, 60, 30)),
     (WIDE, {"w": 240, "h": 120}, (240, 120), (200, 160, 120, 60)),
@@ -307,6 +293,12 @@ STEPS = ("--steps", "2")
 EAST = np.eye(4, k=3)  # a pose's step along x
 
 
+@pytest.mark.parametrize(("distance", "origin"), [(2990, 0), (3014, 3010)])
+def test_the_origin_moves_where_cameras_are_a_thousand_times_as_far_away_as_apart(distance, origin):
+    frames = [Frame("", None, np.eye(4) + (distance + side) * EAST, {}) for side in (-3, 3)]
+    assert far_origin(frames).tolist() == [origin, 0, 0]
+
+
 def test_a_capture_of_stanford_orb_has_its_masks_beside_its_photos(tmp_path):
     """And radiance above 1."""
     poses = sphere_poses()
@@ -335,11 +327,6 @@ def run_on_all(tmp_path_factory):
     return root
 
 
-def test_a_run_on_all_views_is_evaluated_on_all(run_on_all):
-    assert n_views(run_on_all / "run/evaluation.json") == COUNT
-    assert Config.read(run_on_all / "run/config.toml").reading == Reading("all")
-
-
 def test_what_is_held_out_is_said(tmp_path, capsys):
     data = write_transforms(tmp_path / "data")
     assert train(data, tmp_path / "run", *STEPS) == DONE
@@ -355,6 +342,7 @@ def test_what_is_held_out_is_said(tmp_path, capsys):
 
 def test_later_commands_read_the_data_as_the_run_did(run_on_all, tmp_path, capsys):
     run, data = run_on_all / "run", run_on_all / "data"
+    assert n_views(run / "evaluation.json") == COUNT and Config.read(run / "config.toml").reading == Reading("all")
     assert command("evaluate", run, "--data", data, "--out", tmp_path / "run.json") == DONE
     asset = "evaluate", run / "mesh.glb", "--data", data, "--spp", 1
     assert command(*asset, "--out", tmp_path / "asset.json") == DONE
@@ -388,8 +376,8 @@ def test_a_run_far_from_the_origin_says_where_it_is(tmp_path, capsys):
     assert command("export", run, "--out", tmp_path / "asset", "--formats", "ply") == DONE
     exported = json.loads((tmp_path / "asset/origin.json").read_text())
     assert exported["origin"] == stored["origin"] and exported["scale"] == 1
-    for origin in ("x", [1, 2], None, ["x"] * 3, [float("nan")] * 3):
-        (run / "origin.json").write_text(json.dumps({"origin": origin}))
+    for origin, scale in (("x", 1), ([1, 2], 1), (None, 1), (["x"] * 3, 1), ([float("nan")] * 3, 1), ([0, 0, 0], 0)):
+        (run / "origin.json").write_text(json.dumps({"origin": origin, "scale": scale}))
         assert command("export", run, "--out", tmp_path / "other", "--formats", "ply") == BAD_INPUT
         assert not (tmp_path / "other").exists()
         assert "origin.json: does not hold three numbers as 'origin'" in capsys.readouterr().err

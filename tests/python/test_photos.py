@@ -5,6 +5,7 @@ import platform
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,21 +22,11 @@ from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.ops.rays import draw_rays
 from splitnerf.render.occupancy import widened
-from splitnerf.training import loop
-from splitnerf.training.batches import (
-    PixelSource,
-    averaging_factor,
-    pixel_list,
-    reduced,
-    runs_of,
-    training_photos,
-    without_fine_levels,
-)
+from splitnerf.training import batches, loop
+from splitnerf.training.batches import PixelSource, averaging_factor, training_photos
 from test_known_pixels import ignoring_scene
 from test_pixels import scene
 from tiny_runs import tiny, train_scene
-
-CPU = torch.device("cpu")
 
 
 @pytest.fixture
@@ -48,17 +39,13 @@ def in_file(monkeypatch, tmp_path):
     return Reading(max_memory=5e-5), folder
 
 
-@pytest.fixture
-def random_codes():
-    return np.random.default_rng(0).integers(0, 256, (3, 5, 7, 4), np.uint8)
-
-
 @pytest.mark.parametrize(("dtype", "most"), [(np.uint8, 255), (np.uint16, 65535)])
 def test_codes_stand_for_the_values_they_are_rounded_from(dtype, most):
     codes = np.arange(most + 1).astype(dtype)
     assert np.array_equal(encoded(decoded(codes), dtype), codes)
     values = np.random.default_rng(0).random(1000, np.float32)
     assert np.abs(decoded(encoded(values, dtype)) - values).max() < 0.5001 / most
+    assert encoded(np.uint8([0, 1, 255]), np.uint16).tolist() == [0, 257, 65535]
 
 
 def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
@@ -80,16 +67,20 @@ def test_photos_in_a_file_train_as_those_in_memory(in_file, tmp_path):
     assert all(torch.equal(first[name], second[name]) for name in first)
 
 
-def test_the_budget_counts_what_is_there_already(random_codes):
+def test_the_budget_counts_what_is_there_already(monkeypatch):
     before = pixels.memory_for_photos(1.0)
+    assert pixels.memory_for_photos(2.0) - before == 10**9
     array = pixels.new_array((10, 100, 100, 4), np.dtype(np.uint8), False)
     assert before - pixels.memory_for_photos(1.0) == array.nbytes == 400_000
     del array
     assert pixels.memory_for_photos(1.0) == before
+    monkeypatch.setattr(pixels, "memory_bytes", lambda: (9000, 1000))
+    assert pixels.memory_for_photos(0.0) == 500  # half of what is available
 
 
 def test_one_photo_must_fit(tmp_path):
-    with pytest.raises(InputError, match="one photo of .* takes .* GB while it is read.*--max-memory"):
+    told = "one photo of 48x48 takes 5.5e-05 GB while it is read, more than the 1e-06 GB .*--max-memory"  # 24 B a pixel
+    with pytest.raises(InputError, match=told):
         load_dataset(make_blender(tmp_path / "data"), "train", 1, Reading(max_memory=1e-6))
 
 
@@ -109,7 +100,7 @@ def test_a_negative_budget_is_refused(tmp_path, capsys):
 def test_runs_list_the_pixels_of_a_mask():
     masks = torch.rand(4, 9, 13, generator=torch.Generator().manual_seed(0)) > 0.6
     masks[1], masks[2] = False, True
-    listed = pixel_list([runs_of(mask) for mask in masks], 9 * 13, CPU)
+    listed = batches.pixel_list([batches.runs_of(mask) for mask in masks], 9 * 13, torch.device("cpu"))
     numbers = masks.reshape(-1).nonzero().squeeze(1)
     n = listed.count
     cameras = torch.eye(3).expand(4, 3, 3), torch.zeros(4, 3)
@@ -127,19 +118,13 @@ def test_widened_masks_are_those_of_a_largest_value_around(radius):
 def test_reduced_masks_lose_no_pixel():
     mask = torch.zeros(10, 11, dtype=torch.bool)
     mask[3, 7] = mask[9, 0] = True
-    assert reduced(mask, 2).nonzero().tolist() == [[1, 3], [4, 0]]
-
-
-class Requests(list):
-    """Stands in for a file: the bytes that the system was asked to read."""
-
-    def madvise(self, advice, start, size):
-        self.append((start, size))
+    assert batches.reduced(mask, 2).nonzero().tolist() == [[1, 3], [4, 0]]
 
 
 def test_a_photo_is_asked_for_in_parts_that_the_system_takes_whole():
-    requests = Requests()
-    pixels.ask_for(requests, start=5000, size=500_000)
+    requests = []
+    file = SimpleNamespace(madvise=lambda advice, start, size: requests.append((start, size)))
+    pixels.ask_for(file, start=5000, size=500_000)
     ends = [start + size for start, size in requests]
     assert all(size <= 128 * 1024 and start % 4096 == 0 for start, size in requests)
     assert [start for start, _ in requests] == [4096, *ends[:-1]]
@@ -174,10 +159,6 @@ def test_freed_memory_between_arrays_that_stay_is_given_back():
 # ---- averages ----
 
 
-def seeded() -> torch.Generator:
-    return torch.Generator().manual_seed(3)
-
-
 def averaging(dataset: Dataset, factor: float, **settings) -> Config:
     """Settings by which photos are averaged down by a factor, which is rounded down."""
     config = tiny(**settings)
@@ -194,7 +175,9 @@ def far(dataset: Dataset) -> Dataset:
 
 def source_of(dataset: Dataset, config: Config) -> PixelSource:
     photos = training_photos(dataset, config)
-    return PixelSource(photos, config.constants.foreground_share, seeded(), config.losses.edge_pixels)
+    return PixelSource(
+        photos, config.constants.foreground_share, torch.Generator().manual_seed(3), config.losses.edge_pixels
+    )
 
 
 @pytest.mark.parametrize("scene", ["alpha", "ignoring"])
@@ -249,7 +232,7 @@ def test_levels_finer_than_the_photos_are_left_out(least, n_levels, data):
     config = Config().replace({"growth": 2.0, "least_cell": least})
     distance, box = np.linalg.norm(dataset.poses[0, :3, 3]), config.constants.box
     dataset.intrinsics[:, 0] = 1.25 * distance / (2 * box / (config.constants.base_resolution * 2**5))
-    assert without_fine_levels(dataset, config) == config.replace({"n_levels": n_levels})
+    assert batches.without_fine_levels(dataset, config) == config.replace({"n_levels": n_levels})
 
 
 @pytest.mark.parametrize("shown, factor", [(0.6, 2), (0.0, 1)])
@@ -313,7 +296,7 @@ def test_what_the_data_tell_of_the_background_is_compared(tmp_path):
     """A file of half the photo's size, which knows the left half, but where one channel is clipped."""
     photo, told = wall(0.2), np.zeros((60, 90, 4), np.float32)
     told[:, :45], told[:, 45:, :3] = np.float32([0, 200, 100, 255]) / 255, 0.3
-    told[:6, :, 2] = 1
+    told[:6, :, 2] = 251 / 255
     write_image(tmp_path / "told.png", told)
     dataset = far(scene(tmp_path, np.stack([photo, photo])))
     dataset = replace(dataset, behind_paths=[tmp_path / "told.png", None])

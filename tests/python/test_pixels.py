@@ -20,21 +20,7 @@ from tiny_runs import tiny
 HEIGHT, WIDTH = 20, 32
 # fx, fy, cx, cy
 LENSES = np.array([[40.0, 44.0, 15.0, 11.0], [30.0, 30.0, 16.0, 10.0], [55.0, 50.0, 17.5, 8.5]], np.float32)
-POSES = np.stack([look_at(np.array(x), np.zeros(3)) for x in ((3, 1, 1), (-2, 2, 0.5), (0.3, -3, 2))]).astype(
-    np.float32
-)
-
-
-def project(points: np.ndarray, pose: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """[n, 2] pixels (x to the right, y down, the corner of the first at 0) of points [n, 3], by a pinhole camera."""
-    x, y, z = np.linalg.inv(pose.astype(np.float64))[:3] @ np.c_[points, np.ones(len(points))].T
-    fx, fy, cx, cy = lens
-    return np.stack([cx + fx * x / -z, cy - fy * y / -z], 1)
-
-
-def far_along(origins: torch.Tensor, directions: torch.Tensor) -> np.ndarray:
-    np.testing.assert_allclose(directions.norm(dim=1), 1.0, atol=1e-6)
-    return (origins + 5.0 * directions).double().numpy()
+POSES = np.float32([look_at(np.array(x), np.zeros(3)) for x in ((3, 1, 1), (-2, 2, 0.5), (0.3, -3, 2))])
 
 
 @pytest.fixture
@@ -44,10 +30,8 @@ def dataset(tmp_path) -> Dataset:
     images = np.zeros((3, HEIGHT, WIDTH, 4), np.float32)
     images[..., 0], images[..., 1], images[..., 2] = column / WIDTH, row / HEIGHT, np.arange(3)[:, None, None] / 3
     images[:, 6:14, 10:20, 3] = 1.0
-    names = ["a", "b", "c"]
-    return Dataset(
-        "marked", tmp_path, "train", 1, images, POSES, LENSES, names, [tmp_path / n for n in names], np.eye(4)
-    )
+    names, paths = ["a", "b", "c"], [tmp_path / name for name in "abc"]
+    return Dataset("marked", tmp_path, "train", 1, images, POSES, LENSES, names, paths, np.eye(4))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.7, 1.0])
@@ -55,12 +39,14 @@ def test_training_rays_go_through_the_middles_of_their_pixels(dataset, share):
     origins, directions, pixels, view, *_ = PixelSource(dataset, share, generator()).draw(600)
     view = view.numpy()
     assert np.array_equal(view, (pixels[:, 2] * 3).round().long().numpy())
-    ahead = far_along(origins, directions)
+    np.testing.assert_allclose(directions.norm(dim=1), 1.0, atol=1e-6)
+    ahead = np.c_[(origins + 5.0 * directions).double().numpy(), np.ones(600)]
     for i in range(3):
         mine = view == i
         assert mine.sum() > 100
         np.testing.assert_allclose(origins[mine], np.broadcast_to(POSES[i, :3, 3], (mine.sum(), 3)))
-        at = project(ahead[mine], POSES[i], LENSES[i])
+        (fx, fy, cx, cy), (x, y, z) = LENSES[i], np.linalg.inv(POSES[i].astype(np.float64))[:3] @ ahead[mine].T
+        at = np.stack([cx + fx * x / -z, cy - fy * y / -z], 1)  # by a pinhole camera
         marked = pixels[mine, :2].numpy() * [WIDTH, HEIGHT]
         np.testing.assert_allclose(at, marked + 0.5, atol=1e-3)
 
@@ -133,37 +119,33 @@ def drawn(seed: int = 0, edges: EdgeRuns | None = None, **settings):
 
     def draw(n: int, random: torch.Tensor, backgrounds: torch.Tensor, exposures: torch.Tensor) -> tuple:
         assert random.shape == (n,) and 0 <= random.min() < 0.01 and 0.99 < random.max() < 1
-        pixels, *beside = read_pixels(
-            torch.full((n, 4), 3.0), torch.arange(n), torch.arange(n) % 3, exposures, backgrounds, runs
-        )
-        return torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), pixels, torch.arange(n) % 3, *beside
+        view = torch.arange(n) % 3
+        pixels, *beside = read_pixels(torch.full((n, 4), 3.0), torch.arange(n), view, exposures, backgrounds, runs)
+        return torch.full((n, 3), 1.0), torch.full((n, 3), 2.0), pixels, view, *beside
 
     source = SimpleNamespace(generator=torch.Generator().manual_seed(seed), draw=draw)
     return draw_batch(source, 2000, config, torch.tensor([[1.0], [2.0], [3.0]]).repeat(1, 3))
 
 
-def test_rays_and_pixels_are_those_of_the_source():
+def test_what_is_drawn_fills_its_range_beside_what_the_source_gives():
     batch = drawn()
     for found, columns, value in ((batch.rays_o, 3, 1.0), (batch.rays_d, 3, 2.0), (batch.target, 4, 3.0)):
         assert torch.equal(found, torch.full((2000, columns), value))
     assert torch.equal(batch.exposure, (batch.view + 1.0)[:, None].expand(2000, 3))
-
-
-def test_what_is_drawn_fills_its_range():
-    batch = drawn()
     assert batch.background.shape == (2000, 3) and batch.jitter.shape == (2000,)
     assert (batch.background[:, 0] != batch.background[:, 1]).all()
     for x in (batch.background, batch.jitter, batch.phase, batch.probes.chosen):
         assert 0 <= x.min() < 0.01 and 0.99 < x.max() < 1
-    apart = torch.stack(
-        [batch.jitter, batch.phase, *batch.background.T, batch.probes.chosen[:2000], *batch.probes.shifts[:2000].T]
-    )
+    chosen, shifts = batch.probes.chosen[:2000], batch.probes.shifts[:2000]
+    apart = torch.stack([batch.jitter, batch.phase, *batch.background.T, chosen, *shifts.T])
     assert (torch.corrcoef(apart) - torch.eye(9)).abs().max() < 0.1
     anywhere, shifts = batch.probes.anywhere, batch.probes.shifts
     assert anywhere.shape == (4000, 3) and -1.3 <= anywhere.min() < -1.29 and 1.29 < anywhere.max() <= 1.3
     assert batch.probes.chosen.shape == (3000,) and shifts.shape == (3000, 3)
     assert shifts.mean(0).abs().max() < 0.005
     torch.testing.assert_close(shifts.T.cov(), 0.05**2 * torch.eye(3), rtol=0, atol=0.1 * 0.05**2)
+    probes = drawn(**{"losses.smoothness_weight": 0.0}).probes  # without smoothness no neighbours are drawn
+    assert len(probes.anywhere) == 4000 and len(probes.chosen) == len(probes.shifts) == 0
 
 
 def test_whole_pixels_are_seen_before_what_lies_behind_them():
@@ -174,11 +156,6 @@ def test_whole_pixels_are_seen_before_what_lies_behind_them():
     assert torch.equal(batch.whole.nonzero()[:, 0], numbers) and not plain.whole.any()
     torch.testing.assert_close(batch.background[numbers], torch.from_numpy(behind) / 255)
     assert torch.equal(batch.background[~batch.whole], plain.background[~batch.whole])
-
-
-def test_without_smoothness_no_neighbours_are_drawn():
-    probes = drawn(**{"losses.smoothness_weight": 0.0}).probes
-    assert len(probes.anywhere) == 4000 and len(probes.chosen) == len(probes.shifts) == 0
 
 
 def test_the_same_generator_draws_the_same():
@@ -222,11 +199,7 @@ def test_a_band_reaches_its_width_to_both_sides_of_an_edge():
     assert near[20, 30] and near[20, 24:37].sum() == 1
     assert not (near & outside).any()
     assert np.array_equal(near[20, 15:25], near[15, 15:25]) and near[8:12, 30].all() and not near[[7, 12], 30].any()
-
-
-def test_what_lies_behind_is_beside_the_finest_parts_too():
-    """A wire that covers pixels by less than half."""
-    alpha = np.zeros((20, 30), np.float32)
+    alpha = np.zeros((20, 30), np.float32)  # a wire that covers pixels by less than half
     alpha[:, 15] = 0.4
     near, outside = band(alpha, 2)
     assert np.array_equal(near.any(0).nonzero()[0], [15])

@@ -77,9 +77,9 @@ def test_box_of_views():
     centre = np.array([5.0, -2, 1])
     around = np.array([[3, 0, 1], [0, 3, 1], [-3, 0, 2], [0, -3, 0.5]])
     poses = np.stack([look_at(centre + at, centre) for at in around])
-    box = box_of_views(poses, np.full((4, 4), 50.0), np.full((4, 2), 40))
+    box = box_of_views(poses, np.tile([50.0, 30, 0, 0], (4, 1)), np.tile([40, 60], (4, 1)))
     np.testing.assert_allclose(box[:3, :3] @ centre + box[:3, 3], 0, atol=1e-6)
-    assert 1 / box[0, 0] == pytest.approx(0.8 * np.median(np.linalg.norm(around, axis=1)) * 20 / 50)
+    assert 1 / box[0, 0] == pytest.approx(0.8 * np.median(np.linalg.norm(around, axis=1)) * 30 / 50)
     with pytest.raises(ValueError, match="all 4 cameras stand at one place"):
         box_of_views(poses[[0] * 4], np.full((4, 4), 50.0), np.full((4, 2), 40))
 
