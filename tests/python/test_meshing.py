@@ -271,13 +271,27 @@ def test_a_flat_rim_gets_a_flat_cap():
     vertices = mesh.vertices.copy()
     edge = rim & np.isin(np.arange(len(rim)), mesh.edges[~rim[mesh.edges].all(1)])
     vertices[edge, 2] = -0.2
-    moved, stays = capped(np.float32(vertices), mesh.faces, rim)
+    moved, _, stays = capped(np.float32(vertices), mesh.faces, rim)
     assert np.array_equal(stays, rim)
     assert np.array_equal(moved[rim], np.float32(vertices)[rim])
     assert moved[~rim, 2] == pytest.approx(-0.2, abs=1e-4)
     disc = trimesh.Trimesh(moved, mesh.faces, process=False)
     expected = np.pi * (2 / 3 + 0.2 - 0.2**3 / 3)  # of the segment above the plane
     assert is_closed(mesh.faces) and disc.volume == pytest.approx(expected, rel=0.03)
+
+
+def test_what_lies_behind_a_narrow_hole_is_cut_out():
+    """A hollow ball with a hole of radius 0.1 becomes a solid one, which the simplification can bring to any number of faces: of a
+    wall that is folded into the hole it could not."""
+    half = np.linspace(0.1, np.pi, 200)[:, None]
+    wall = np.concatenate([np.sin(half), -np.cos(half)], axis=1)
+    mesh = trimesh.creation.revolve([*wall, *0.9 * wall[::-1]], sections=200)
+    outside = np.linalg.norm(mesh.vertices, axis=1) > 0.95
+    vertices, faces, stays = capped(np.float32(mesh.vertices), mesh.faces, outside)
+    assert is_closed(faces) and stays.sum() == outside.sum() and len(vertices) == outside.sum() + 1
+    for found, n_faces in (((vertices, faces), len(faces)), (decimate(vertices, faces, 4000), 4000)):
+        assert len(found[1]) <= n_faces
+        assert trimesh.Trimesh(*found).volume == pytest.approx(4 / 3 * np.pi, rel=5e-3)
 
 
 def test_a_body_that_no_photo_shows_goes():
@@ -290,7 +304,7 @@ def test_a_body_that_no_photo_shows_goes():
         assert (len(vertices), len(faces), dropped) == (left * n, left * len(mesh.faces) // 2, 2 - left)
         assert np.array_equal(vertices, np.float32(mesh.vertices[: left * n])) and is_closed(faces)
         assert np.array_equal(seen, number[: left * n] < shown)
-    moved, stays = capped(vertices, faces, seen)
+    moved, _, stays = capped(vertices, faces, seen)
     assert np.array_equal(moved, vertices) and stays.all()
 
 

@@ -136,7 +136,7 @@ def write_assets(
         spacing = 2.0 * c.constants.box / (resolution - 1)
         seen = seen_vertices(vertices, faces, cameras, 0.25 * spacing)
         vertices, faces, seen, n_unseen = drop_unseen(vertices, faces, seen)
-        vertices, on_surface = capped(vertices, faces, seen)
+        vertices, faces, on_surface = capped(vertices, faces, seen)
         world_from_box = np.linalg.inv(box_from_world)
         mesh = trimesh.Trimesh(transform_points(world_from_box, vertices), faces, process=False)
         n_textured, watertight, (origin, scale) = len(faces), is_closed(faces), placing.of(mesh.vertices)

@@ -9,11 +9,13 @@ import fast_simplification
 import numpy as np
 import trimesh
 from scipy.sparse import coo_matrix, diags
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from trimesh.graph import connected_component_labels
 
 MIN_COMPONENT = 0.01  # share of the largest component's faces
 LEAST_SEEN = 0.1  # share of a component's vertices that photos must show
+FOLDED = 0.2  # share of its area that what no photo shows keeps at least on a membrane
 # The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
 AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
 
@@ -24,7 +26,7 @@ def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple
     [m, 3] and the number of removed components."""
     label = connected_component_labels(np.concatenate([faces[:, :2], faces[:, 1:]]), len(vertices))
     count = np.bincount(label[faces[:, 0]], minlength=label.max() + 1)
-    a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
+    a, b, c = (vertices[faces[:, i], :3].astype(np.float64) for i in range(3))
     volume = np.bincount(label[faces[:, 0]], (a * np.cross(b, c)).sum(axis=1) / 6.0, minlength=len(count))
     dropped = ((count < MIN_COMPONENT * count.max()) | (volume < 0)) & (count > 0)
     vertices, faces = _compact(vertices, faces[~dropped[label[faces[:, 0]]]])
@@ -42,21 +44,47 @@ def drop_unseen(
     return *_compact(vertices, faces[kept[faces[:, 0]]]), seen[kept], len(np.unique(label[~kept]))
 
 
-def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Moves the vertices [n, 3] that are not `seen` [n] on to a membrane between those seen: each into the middle of its
-    neighbours. A flat rim gets a flat cap. Without any seen vertex all stay as they are. Returns vertices [n, 3], and [n] bool,
-    those that stay."""
+    neighbours. A flat rim gets a flat cap. What would fold, as a labyrinth behind a crack does, is cut out, and its rims are
+    filled. Without any seen vertex all stay as they are. Returns vertices [k, 3], faces [l, 3], and [k] bool, the vertices that
+    were not moved."""
     n, edges = len(vertices), trimesh.geometry.faces_to_edges(faces)
     links = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
     links = links.maximum(links.T)  # the rim of a mesh that is not closed
     free = ~seen
     if seen.all() or free.all():
-        return vertices, np.ones(n, bool)
+        return vertices, faces, np.ones(n, bool)
     balance = (diags(np.asarray(links.sum(1)).ravel()) - links)[free]
     result, pull = vertices.copy(), -(balance[:, ~free] @ vertices[~free].astype(np.float64))
     for axis in range(3):
         result[free, axis] = cg(balance[:, free], pull[:, axis], x0=vertices[free, axis], rtol=1e-6, maxiter=5000)[0]
-    return result, ~free
+    part = np.full(n, -1)
+    part[free] = connected_components(links[free][:, free])[1]
+    part = part[faces].max(axis=1)  # of a face
+    within = part >= 0
+    before, after = (np.bincount(part[within], _areas(x, faces[within])) for x in (vertices, result))
+    cut = within & (after < FOLDED * before)[part]
+    return _filled(result, faces[~cut], seen) if cut.any() else (result, faces, seen)
+
+
+def _filled(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What :func:`capped` returns of faces with holes: a fan of triangles fills each, and small parts that are now apart go."""
+    points, faces = split_pinches(*_compact(np.column_stack([vertices, seen]), faces))
+    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    rim = ~np.isin(start * len(points) + end, end * len(points) + start)
+    start, end = start[rim], end[rim]
+    label = connected_component_labels(np.stack([start, end], axis=1), len(points))
+    _, hole, count = np.unique(label[start], return_inverse=True, return_counts=True)
+    middles = coo_matrix((1.0 / count[hole], (hole, np.arange(len(start))))).tocsr() @ points[start]
+    middles[:, 3] = 0
+    fans = np.stack([end, start, len(points) + hole], axis=1)
+    points, faces, _ = drop_floaters_and_cavities(np.concatenate([points, middles]), np.concatenate([faces, fans]))
+    return points[:, :3].astype(vertices.dtype), faces, points[:, 3] > 0
+
+
+def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    return trimesh.triangles.area(vertices[faces].astype(np.float64))
 
 
 def is_closed(faces: np.ndarray) -> bool:
