@@ -11,14 +11,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from splitnerf.data.asset import Asset, Material, vertex_tangents
 from splitnerf.export import bake, surface, writers
-from splitnerf.export.bake import bake_occlusion, rasterise
 from splitnerf.export.meshing import extract_mesh
 from splitnerf.export.surface import Surface, to_level_set
 from splitnerf.export.textured import PADDING, textured_asset, unwrap, vertex_normals
-from splitnerf.export.writers import encode_maps
 
-SIZE = 256
-SPACING = 3.0 / 79
+SIZE, SPACING = 256, 3.0 / 79
 
 
 def bumpy(x):
@@ -54,9 +51,14 @@ def surface_of(field):
 
 @pytest.fixture(scope="module")
 def baked():
+    """What is baked, its texels, their interpolated normals and their points on the surface."""
     vertices, faces = extract_mesh(bumpy, 1.5, 80)
     sizes = {"n_faces": 600, "texture_size": SIZE, "spacing": SPACING, "occlusion_offset": 0.01}
-    return textured_asset("bumpy", vertices, faces, surface_of(bumpy), **sizes)
+    asset, *more = textured_asset("bumpy", vertices, faces, surface_of(bumpy), **sizes)
+    texels = bake.rasterise(asset.uv, asset.triangles, SIZE)
+    places, normal = (texels.interpolate(values, asset.triangles) for values in (asset.vertices, asset.normals))
+    along = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return asset, *more, texels, normal, to_level_set(surface_of(bumpy), places, 2 * SPACING, along)
 
 
 def angle(a, b):
@@ -66,14 +68,12 @@ def angle(a, b):
 
 def test_normal_map_restores_the_fine_normals(baked):
     """The map in 8 bit, decoded as glTF says, gives the field's normals where the coarse mesh's are off."""
-    asset, *_ = baked
-    texels = rasterise(asset.uv, asset.triangles, SIZE)
-    normal, tangent = (texels.interpolate(values, asset.triangles) for values in (asset.normals, asset.tangents))
+    asset, *_, texels, normal, points = baked
+    tangent = texels.interpolate(asset.tangents, asset.triangles)
     bitangent = np.cross(normal, tangent[:, :3]) * tangent[:, 3:]
     stored = np.rint(asset.materials[0].normal_texture * 127.5 + 127.5) / 127.5 - 1
     local = stored.reshape(-1, 3)[texels.index]
     world = local[:, :1] * tangent[:, :3] + local[:, 1:2] * bitangent + local[:, 2:] * normal
-    points = to_level_set(surface_of(bumpy), texels.interpolate(asset.vertices, asset.triangles), 2 * SPACING, normal)
     truth = with_gradient(bumpy)(torch.from_numpy(points))[1].numpy()
     assert angle(normal, truth).mean() > 2.0
     assert angle(world, truth).mean() < 0.5
@@ -81,12 +81,8 @@ def test_normal_map_restores_the_fine_normals(baked):
 
 
 def test_albedo_and_materials_are_those_of_the_surface(baked):
-    asset, *_ = baked
+    asset, *_, texels, _, points = baked
     material = asset.materials[0]
-    texels = rasterise(asset.uv, asset.triangles, SIZE)
-    normal = texels.interpolate(asset.normals, asset.triangles)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    points = to_level_set(surface_of(bumpy), texels.interpolate(asset.vertices, asset.triangles), 2 * SPACING, normal)
     assert bumpy(torch.from_numpy(points)).abs().max() < 1e-4
     assert np.abs(material.albedo_texture.reshape(-1, 3)[texels.index] - albedo_at(points)).max() < 1e-5
     roughness, metallic = material.roughness_metallic_texture.reshape(-1, 2)[texels.index].T
@@ -95,7 +91,7 @@ def test_albedo_and_materials_are_those_of_the_surface(baked):
 
 
 def test_mesh_is_light_closed_and_on_the_surface(baked):
-    asset, occlusion, watertight = baked
+    asset, occlusion, watertight, *_ = baked
     assert watertight and len(asset.triangles) <= 600
     assert bumpy(torch.from_numpy(asset.vertices)).abs().max() < 1e-4
     welded = trimesh.Trimesh(asset.vertices, asset.triangles, process=False)
@@ -117,7 +113,7 @@ def test_charts_do_not_overlap_and_keep_their_distance():
     origins, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), SIZE)
     assert np.array_equal(origins[faces], ball.faces) and uv.min() >= 0 and uv.max() <= 1
     n_charts, chart = charts_of(faces)
-    texels = rasterise(uv, faces, SIZE)
+    texels = bake.rasterise(uv, faces, SIZE)
     owner = np.full(SIZE * SIZE, -1)
     owner[texels.index] = chart[faces[texels.triangle, 0]]
     owner = owner.reshape(SIZE, SIZE)
@@ -148,7 +144,7 @@ def test_charts_are_small_and_fill_a_large_texture():
     _, faces, uv = unwrap(np.float32(ball.vertices), np.int32(ball.faces), 1024)
     _, chart = charts_of(faces)
     assert np.bincount(chart[faces[:, 0]], ball.area_faces).max() < 2 * ball.area / 64
-    assert len(rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
+    assert len(bake.rasterise(uv, faces, 1024).index) > 0.38 * 1024**2
 
 
 def test_points_move_onto_the_level_set_and_never_away():
@@ -168,8 +164,19 @@ def test_points_move_onto_the_level_set_and_never_away():
     moved = to_level_set(squares, points, 0.02)
     assert np.linalg.norm(moved - points, axis=1).max() < 0.0201
     assert (np.abs(np.linalg.norm(moved, axis=1) - 1) <= np.abs(np.linalg.norm(points, axis=1) - 1) + 1e-6).all()
+    for slope, end in ((0.3, 0.0), (0.15, 0.1)):  # along a line that rises by less than 0.2 they stay
+        flat, along = dataclasses.replace(squares, sdf=lambda x, slope=slope: slope * x[:, 0]), np.float32([[1, 0, 0]])
+        assert to_level_set(flat, 0.1 * along, 0.2, along)[0] == pytest.approx([end, 0, 0], abs=1e-5)
     across = np.float32(np.cross(directions, [0.0, 0.0, 1.0]))
     assert np.array_equal(to_level_set(squares, points, 0.2, across / np.linalg.norm(across, None, 1, True)), points)
+
+
+def test_normals_of_a_map_are_in_the_frame_of_its_texel():
+    """That of a mirrored chart too; what faces into the surface is raised to 0.02 above it."""
+    world, up = np.float32([[0.6, 0, 0.8], [0.6, 0, 0.8], [2, 0, -1]]), np.float32([[0, 0, 1]] * 3)
+    found = bake.to_tangent_space(world, up, np.float32([[1, 0, 0, 1], [0, 1, 0, -1], [0, -1, 0, 1]]))
+    low = np.array([0, 2 / 5**0.5, 0.02])
+    assert found == pytest.approx(np.array([[0.6, 0, 0.8], [0, 0.6, 0.8], low / np.linalg.norm(low)]), abs=1e-6)
 
 
 def test_materials_that_are_not_finite_are_refused():
@@ -187,7 +194,7 @@ def test_occlusion_beside_a_wall():
     faces = np.int32([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     normals = np.float32([[0, 0, 1]] * 4 + [[1, 0, 0]] * 4)
     uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]] + [[2, 2], [3, 2], [3, 3], [2, 3]])  # the wall off the texture
-    occlusion = bake_occlusion(unwrapped(vertices, faces, normals, uv), 128, 1e-3)
+    occlusion = bake.bake_occlusion(unwrapped(vertices, faces, normals, uv), 128, 1e-3)
     d = (np.arange(128) + 0.5) / 64
     expected = 1 - 0.5 * (1 - d / np.sqrt(d**2 + 1))
     assert occlusion.mean(axis=0)[8:-8] == pytest.approx(expected[8:-8], abs=0.02)
@@ -246,14 +253,14 @@ def test_occlusion_baked_small_stands_where_it_belongs(monkeypatch):
         return points[:, :1], None
 
     monkeypatch.setattr(bake, "occlusion_factors", factors)
-    found = bake_occlusion(square(), 64, 0.037)
+    found = bake.bake_occlusion(square(), 64, 0.037)
     x = (np.arange(64) + 0.5) / 64
     np.testing.assert_allclose(found[:, 2:-2], np.broadcast_to(x[2:-2], (64, 60)), atol=1e-3)
 
 
 def test_charts_between_the_texels_are_refused():
     mesh = dataclasses.replace(square(), uv=square().uv * np.float32(0.01) + np.float32(0.02))
-    assert (bake_occlusion(mesh, 8, 0.01) == 1).all()
+    assert (bake.bake_occlusion(mesh, 8, 0.01) == 1).all()
     with pytest.raises(RuntimeError, match="no texel of 8 x 8 lies in a chart; give a larger texture size"):
         bake.bake(mesh, ball(), 8, reach=0.1, offset=0.01)
 
@@ -283,6 +290,10 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
     for slope in (1.0, 3.0):
         np.testing.assert_allclose(vertex_normals(ball(sign=slope), vertices, faces), tilted, atol=1e-5)
     np.testing.assert_allclose(vertex_normals(ball(sign=-1.0), vertices, faces), mesh.vertex_normals, atol=1e-5)
+    for cosine, z in ((0.25, 0.25), (0.15, 1.0)):  # those that lean by up to acos(0.2) are taken
+        slope = torch.tensor([[(1 - cosine**2) ** 0.5, 0.0, cosine]]).expand(4, 3)
+        leans = dataclasses.replace(ball(), gradient=lambda x, slope=slope: (x[:, 0], slope))
+        assert vertex_normals(leans, square().vertices, square().triangles)[:, 2] == pytest.approx(z)
     more, field = np.concatenate([vertices, np.float32([[0, 0.9, 0]])]), np.float32([0.3, 0.9, 0]) / 0.9**0.5
     assert vertex_normals(ball(), more, faces)[-1] == pytest.approx(field, abs=1e-5)  # of no face
     assert vertex_normals(ball(sign=0.0), more, faces)[-1].tolist() == [0, 0, 1]
@@ -291,11 +302,11 @@ def test_normals_are_the_fields_where_they_agree_with_the_faces():
 def test_without_occlusion_all_is_open_and_what_is_not_finite_is_refused():
     material = Material("paint", roughness_metallic_texture=np.full((4, 4, 2), 0.25, np.float32))
     asset = dataclasses.replace(square(), materials=[material])
-    assert (encode_maps("a", asset, None)[1][..., 0] == 255).all()
-    assert (encode_maps("a", asset, np.zeros((4, 4)))[1][..., 0] == 0).all()
+    assert (writers.encode_maps("a", asset, None)[1][..., 0] == 255).all()
+    assert (writers.encode_maps("a", asset, np.zeros((4, 4)))[1][..., 0] == 0).all()
     asset.materials[0].roughness_metallic_texture[0, 0, 0] = np.nan
     with pytest.raises(RuntimeError, match="finite"):
-        encode_maps("a", asset, None)
+        writers.encode_maps("a", asset, None)
 
 
 # ---- tangents ----

@@ -11,27 +11,18 @@ from painted_ball import bare
 from splitnerf.cli import DONE, main
 from splitnerf.data.asset import Material
 from splitnerf.data.dataset import Dataset
-from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, write_image
+from splitnerf.data.images import linear_to_srgb, over_background, read_image, srgb_to_linear, to_uint8, write_image
 from splitnerf.data.truth import ViewTruth, map_files, read_relit, relight_maps
 from splitnerf.errors import InputError
-from splitnerf.evaluate import sheet
+from splitnerf.evaluate import scoring, sheet
 from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, scaled_scores
 from splitnerf.evaluate.score_table import evaluation_table, table_of_lights
-from splitnerf.evaluate.scoring import (
-    Evaluated,
-    Protocol,
-    RelitViews,
-    asset_predictions,
-    choose_views,
-    evaluate_asset,
-    relight,
-    relight_scores,
-)
+from splitnerf.evaluate.scoring import Evaluated, Protocol, RelitViews, choose_views, evaluate_asset, relight_scores
 from splitnerf.evaluate.sheet import picture_grid, write_sheet
 from splitnerf.export.writers import write_glb
 from tiny_runs import refused
 
-SIZE = 16
+SIZE, HEIGHT, WIDTH, TILTED = 16, 12, 16, np.float32([0.6, 0, 0.8])
 
 
 def view(group, prediction, truth, alpha=1.0, truth_alpha=1.0):
@@ -53,46 +44,46 @@ def test_one_scale_for_all_views_of_all_groups():
 
 def test_only_foreground_of_both_counts_for_the_scale_and_values_are_clipped():
     seen = view("a", (0.25, 0.25, 0.25), (0.5, 0.5, 0.5))
-    views = [seen, view("a", (0.9, 0.9, 0.9), (0.1, 0.1, 0.1), truth_alpha=0.5), view("a", 0.9, 0.1, alpha=0.9)]
+    views = [seen, view("a", (0.9, 0.9, 0.9), (0.1, 0.1, 0.1), truth_alpha=0.9), view("a", 0.9, 0.1, alpha=0.9)]
     assert scaled_scores(lambda: views)[0]["lsq"]["scale"] == pytest.approx([2, 2, 2])
     bright = [view("a", 0.8, 1.0), view("a", 0.8, 2.2)]
     # The fit is 2, the scaled prediction 1.6, clipped to white as the truth is: no error is left.
     assert scaled_scores(lambda: bright)[0]["psnr"] == 100
 
 
+def toy(root: Path, lenses: np.ndarray, size: tuple[int, int], lights: dict[str, float], step: float, alpha: float):
+    """Grey test views and their relit images, brighter by a step from view to view; an alpha of 0: as large as their colours."""
+    images = np.full((len(lenses), *size, 4), [0.5, 0.5, 0.5, alpha or 0.5], np.float32)
+    paths = [root / f"test/r_{i}.png" for i in range(len(lenses))]
+    for i, path in enumerate(paths):
+        write_image(path, images[i])
+        for name, level in lights.items():
+            rgba = np.full((*size, 4), [level + step * i] * 3 + [alpha or level + step * i])
+            write_image(path.with_name(f"r_{i}_relit_{name}.png"), rgba)
+    eyes = np.tile(np.eye(4, dtype=np.float32), (len(lenses), 1, 1))
+    return Dataset("toy", root, "test", 1, images, eyes, lenses, [p.stem for p in paths], paths, np.eye(4))
+
+
 @pytest.fixture
 def views(tmp_path):
     """Five test views, with relit images of two maps and three map files."""
-    paths = [tmp_path / f"test/r_{i}.png" for i in range(5)]
-    images = np.full((5, SIZE, SIZE, 4), 0.5, np.float32)
-    images[..., 3] = 1
-    for i, path in enumerate(paths):
-        write_image(path, images[i])
-        for name, level in (("city", 0.2), ("my_sun", 0.6)):
-            rgba = np.full((SIZE, SIZE, 4), level + 0.05 * i)
-            rgba[..., 3] = 1
-            write_image(path.with_name(f"r_{i}_relit_{name}.png"), rgba)
     for name in ("relight_city.hdr", "relight_my_sun.exr", "relight_night.hdr", "light.hdr"):
         write_image(tmp_path / name, np.ones((4, 8, 3)))
-    eye, lens = np.tile(np.eye(4, dtype=np.float32), (5, 1, 1)), np.ones((5, 4), np.float32)
-    return Dataset("toy", tmp_path, "test", 1, images, eye, lens, [p.stem for p in paths], paths, np.eye(4))
+    return toy(tmp_path, np.ones((5, 4), np.float32), (SIZE, SIZE), {"city": 0.2, "my_sun": 0.6}, 0.05, 1.0)
 
 
 def test_what_is_scored_finds_the_scale_that_was_planted(views):
     """Of relit views and of the albedo, a factor of its own for each channel, and nearly no error behind it."""
     factors = np.float32([0.7, 1.6, 1.0])
-    relit = {
-        name: [np.dstack([linear_to_srgb(srgb_to_linear(truth[..., :3]) / factors), truth[..., 3]]) for truth in truths]
-        for name in ("city", "my_sun")
-        for truths in [[read_relit(views, i, name) for i in range(5)]]
-    }
-    relit = {name: [np.round(255 * image).astype(np.uint8) for image in images] for name, images in relit.items()}
+    relit = {name: [read_relit(views, i, name) for i in range(5)] for name in ("city", "my_sun")}
+    scored = lambda: relight_scores(RelitViews({k: [*map(to_uint8, images)] for k, images in relit.items()}, views, 8))
+    assert scored()["psnr"] == scored()["raw"]["psnr"] == 100
+    for image in (image for images in relit.values() for image in images):
+        image[..., :3] = linear_to_srgb(srgb_to_linear(image[..., :3]) / factors)
     albedo = np.float32(np.random.default_rng(0).uniform(0.1, 0.5, (SIZE, SIZE, 3)))
     prediction = {"alpha": np.ones((SIZE, SIZE)), "albedo": albedo / factors}
-    of_albedo = evaluate_maps([prediction], replace(views, images=views.images[:1]), [ViewTruth(albedo=albedo)])[
-        "albedo"
-    ]
-    for scores in (relight_scores(RelitViews(relit, views, 1)), of_albedo):
+    of_albedo = evaluate_maps([prediction], views.select([0]), [ViewTruth(albedo=albedo)])["albedo"]
+    for scores in (scored(), of_albedo):
         assert scores["lsq"]["scale"] == pytest.approx(factors, rel=0.01) and scores["raw"]["scale"] == [1, 1, 1]
         assert scores["psnr"] > 45 and scores["raw"]["psnr"] < 25
 
@@ -133,8 +124,6 @@ def test_published_protocols_demand_their_numbers(views, tmp_path):
     many = views.select(list(range(5)) * 8)
     chosen, maps = choose_views(many, Protocol(lights="high", maps=folder))
     assert len(chosen) == 20 and list(maps) == [f"m{i}" for i in range(7)]
-    with pytest.raises(InputError, match="r_0_relit_m0.png: no such image"):
-        read_relit(chosen, 0, "m0")
 
 
 def test_views_are_evenly_spread(views):
@@ -147,26 +136,9 @@ def test_views_are_evenly_spread(views):
         choose_views(views, Protocol(spp=0))
 
 
-def test_relit_images_are_scored_with_one_scale_and_per_map(views):
-    levels = {"city": 0.2, "my_sun": 0.6}
-    images = {}
-    for name, level in levels.items():
-        rgba = [np.full((SIZE, SIZE, 4), 255 * (level + 0.05 * i)) for i in range(5)]
-        images[name] = [np.rint(image).astype(np.uint8) for image in rgba]
-        for image in images[name]:
-            image[..., 3] = 255
-    relit = relight_scores(RelitViews(images, views, 8))
-    assert relit["psnr"] == relit["raw"]["psnr"] == 100 and relit["lsq"]["scale"] == pytest.approx([1, 1, 1])
-    assert set(relit["maps"]) == set(levels) and (relit["views"], relit["spp"]) == (5, 8)
-    for image in images["city"]:
-        image[..., :3] = 51
-    relit = relight_scores(RelitViews(images, views, 8))
-    assert relit["maps"]["my_sun"]["psnr"] > relit["psnr"] > relit["maps"]["city"]["psnr"]
-
-
 FULL = {"novel_view": {"psnr": 30.0, "ssim": 0.9, "lpips": 0.05}, "albedo": None}
-FULL |= {"relight": {"psnr": 27.126, "ssim": 0.9412, "lpips": None}, "normal_mae_deg": 4.0, "roughness_mae": 0.1}
-FULL |= dict(metallic_balanced_accuracy=None, light_psnr=20.0, chamfer=0.01, f_score=0.97, seconds=90.0)
+FULL |= {"relight": {"psnr": 27.126, "ssim": 0.9412, "lpips": None}, "normal_mae_deg": 4.0, "roughness_mae": 0.1234}
+FULL |= dict(metallic_balanced_accuracy=0.875, light_psnr=20.0, chamfer=0.01, f_score=0.97, seconds=90.0)
 
 
 def test_table():
@@ -175,10 +147,9 @@ def test_table():
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert [row[0] for row in cells] == ["scene", "---", "chair", "lego", "**mean**"]
     assert len({len(row) for row in cells}) == 1
-    chair, lego, mean = (dict(zip(cells[0], row)) for row in cells[2:])
-    assert (chair["relight, dB"], chair["relight, SSIM"], chair["relight, LPIPS"]) == ("27.13", "0.9412", "-")
-    assert (chair["albedo, dB"], lego["relight, dB"], chair["time, min"]) == ("-", "-", "1.5")
-    assert (mean["novel view, dB"], mean["normals, degrees"]) == ("32.00", "5.00")
+    assert cells[2] == "chair 27.13 0.9412 - - - - 30.00 0.9000 0.0500 4.00 0.123 0.875 20.00 0.0100 0.970 1.5".split()
+    lego, mean = (dict(zip(cells[0], row)) for row in cells[3:])
+    assert (lego["relight, dB"], mean["novel view, dB"], mean["normals, degrees"]) == ("-", "32.00", "5.00")
     assert (mean["relight, dB"], mean["novel view, LPIPS"], mean["albedo, dB"]) == ("27.13 (1)", "0.0500 (1)", "-")
     assert "mean" not in evaluation_table([("chair", FULL)])
 
@@ -197,10 +168,11 @@ def test_tables_are_made_from_scores_written_before(tmp_path, capsys):
     for name in ("chair", "lego"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "evaluation.json").write_text(json.dumps(FULL))
-    (tmp_path / "old_evaluation.json").write_text(json.dumps(FULL))
-    targets = [str(tmp_path / name) for name in ("chair", "lego", "old.GLB")]
+    for name in ("old", "new"):
+        (tmp_path / f"{name}_evaluation.json").write_text(json.dumps(FULL))
+    targets = [str(tmp_path / name) for name in ("chair", "lego", "old.GLB", "new.gltf")]
     assert main(["evaluate", *targets, "--table", str(tmp_path / "out.md")]) == DONE
-    assert (tmp_path / "out.md").read_text().count("| 27.13 |") == 4
+    assert (tmp_path / "out.md").read_text().count("| 27.13 |") == 5
     assert "relit views            PSNR 27.13 dB" in capsys.readouterr().out
 
 
@@ -242,10 +214,6 @@ def test_a_published_protocol_says_that_it_lacks_lpips(data, monkeypatch, capsys
 # ---- assets ----
 
 
-HEIGHT, WIDTH = 12, 16
-TILTED = np.float32([0.6, 0, 0.8])
-
-
 class Answers:
     """A renderer that notes what it is asked and answers with constants, brighter under brighter light."""
 
@@ -253,7 +221,7 @@ class Answers:
         self.asked = []
 
     def render(self, environment, pose, lens, width, height, *, spp, seed):
-        self.asked.append((environment.mean(), pose, lens, width, height, spp, seed))
+        self.asked.append((environment, pose, lens, width, height, spp, seed))
 
         def constant(*values):
             return np.broadcast_to(np.float32(values), (height, width, len(values)))
@@ -273,46 +241,36 @@ class Answers:
 @pytest.fixture
 def asset_views(tmp_path) -> Dataset:
     """Three test views of their own poses and lenses, in a frame half as large as the world, each under two lights."""
-    paths = [tmp_path / f"test/r_{i}.png" for i in range(3)]
-    images = np.full((3, HEIGHT, WIDTH, 4), 0.5, np.float32)
-    for i, path in enumerate(paths):
-        write_image(path, images[i])
-        for name, level in (("day", 0.3), ("night", 0.1)):
-            write_image(path.with_name(f"r_{i}_relit_{name}.png"), np.full((HEIGHT, WIDTH, 4), level + 0.2 * i))
     for name, level in (("day", 4.0), ("night", 1.0)):
         write_image(tmp_path / f"relight_{name}.exr", np.full((4, 8, 3), level))
-    poses = np.tile(np.eye(4, dtype=np.float32), (3, 1, 1))
-    poses[:, :3, 3] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
     lenses = np.float32([[10, 11, 8, 6], [12, 13, 7, 5], [14, 15, 9, 4]])
-    return Dataset(
-        "toy", tmp_path, "test", 1, images, poses, lenses, [p.stem for p in paths], paths, np.diag([0.5, 0.5, 0.5, 1.0])
-    )
-
-
-def maps_of(asset_views: Dataset) -> dict[str, Path]:
-    return {name: asset_views.root / f"relight_{name}.exr" for name in ("day", "night")}
+    data = toy(tmp_path, lenses, (HEIGHT, WIDTH), {"day": 0.3, "night": 0.1}, 0.2, 0.0)
+    data.poses[:, :3, 3] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    return replace(data, box_from_world=np.diag([0.5, 0.5, 0.5, 1.0]))
 
 
 def test_an_assets_maps_are_those_of_each_view(asset_views):
-    """Seen in the world, by each view's lens, with noise of its own; normals are those of the mesh, of length one."""
-    renderer = Answers()
-    predictions = asset_predictions(renderer, asset_views, np.full((2, 4, 3), 8.0, np.float32), spp=5)
+    """Seen in the world, by each view's lens, under its turn of the light, with noise of its own; normals are the mesh's."""
+    renderer, sky = Answers(), np.float32([5, 5, 11, 11] * 2).reshape(2, 4, 1).repeat(3, axis=2)
+    turns = np.stack([np.diag([c, c, 1]).astype(np.float32) for c in (1, -1, 1)])
+    predictions = scoring.asset_predictions(renderer, replace(asset_views, light_turns=turns), sky, spp=5)
     for i, (light, pose, lens, width, height, spp, seed) in enumerate(renderer.asked):
         np.testing.assert_allclose(pose[:3, 3], 2 * asset_views.poses[i, :3, 3])
-        assert lens == tuple(asset_views.intrinsics[i]) and (light, width, height, spp) == (8.0, WIDTH, HEIGHT, 5)
+        assert lens == tuple(asset_views.intrinsics[i]) and (width, height, spp) == (WIDTH, HEIGHT, 5)
+        np.testing.assert_array_equal(light > 8, (sky[:, ::-1] if i == 1 else sky) > 8)
     seeds = {asked[-1] for asked in renderer.asked}
     assert len(seeds) == len(predictions) == 3 and min(seeds) >= 2**31
     prediction = predictions[0]
-    assert prediction["normal"][3, 4] == pytest.approx(TILTED)
     assert prediction["rgb"][3, 4] == pytest.approx(linear_to_srgb(np.float32([0.8, 0.4, 1])))
     known = {"alpha": 0.5, "albedo": [0.1, 0.2, 0.3], "roughness": 0.4, "metallic": 0.7}
+    known |= {"normal": TILTED, "shading_normal": [0, 0, 1]}
     assert all(prediction[name][3, 4] == pytest.approx(value) for name, value in known.items())
-    assert "rgb" not in asset_predictions(Answers(), asset_views, None, spp=1)[0]
+    assert "rgb" not in scoring.asset_predictions(Answers(), asset_views, None, spp=1)[0]
 
 
 def test_relit_views_stand_beside_their_truth(asset_views):
     """By map and view, under that map's light, in 8 bit with the coverage; both in linear light once they are compared."""
-    relit = relight(Answers(), asset_views, maps_of(asset_views), spp=3)
+    relit = scoring.relight(Answers(), asset_views, relight_maps(asset_views), spp=3)
     expected = {"day": [0.4, 0.45, 0.5], "night": [0.25, 0.3, 0.35]}
     for name, levels in expected.items():
         for i, level in enumerate(levels):
@@ -324,14 +282,15 @@ def test_relit_views_stand_beside_their_truth(asset_views):
             assert found.truth_alpha[0, 0] == pytest.approx(true, abs=0.002)
     asked = []
     scores = relight_scores(relit, lambda image, truth: asked.append(1) or 0.5)
-    assert scores["spp"] == 3 and scores["views"] == 3 and scores["lpips"] == 0.5 and len(asked) == 6
+    assert (scores["spp"], scores["views"], scores["lpips"], len(asked)) == (3, 3, 0.5, 6)
+    assert list(scores["maps"]) == list(expected)
 
 
 def test_truth_that_is_missing_is_named_before_anything_is_rendered(asset_views):
     asset_views.image_paths[2].with_name("r_2_relit_night.png").unlink()
     renderer = Answers()
     with pytest.raises(Exception, match="r_2_relit_night.png: no such image"):
-        relight(renderer, asset_views, maps_of(asset_views), spp=3)
+        scoring.relight(renderer, asset_views, relight_maps(asset_views), spp=3)
     assert not renderer.asked
 
 
@@ -351,8 +310,22 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
     write_image(tmp_path / "environment.hdr", np.ones_like(light))
     beside = evaluate_asset(path, data, Protocol(spp=2, downscale=2))
     assert beside.scores["light_psnr"] > 50 and beside.scores["novel_view"] and beside.scores["views"] == 2
-    assert beside.dataset.images.shape[1:3] == (12, 12)
+    assert beside.dataset.images.shape[1:3] == (12, 12) and (beside.dataset.exposures == 1).all()
     assert evaluate_asset(path, data, Protocol(spp=1, views=1), tmp_path / "environment.hdr").scores["light_psnr"] < 40
+
+
+def test_a_photos_exposure_is_the_median_ratio_of_what_counts(views):
+    """Of means over the channels, where both have the object and the camera, at its exposure of 2, saw nothing dark or clipped."""
+    seen = np.full((5, SIZE, SIZE, 3), 0.5, np.float32)
+    seen[:, :3], seen[:, 3:6], seen[:, 6], seen[:, 7] = 0.009, 0.96, 0.012, 0.94
+    ratio = np.full((SIZE, SIZE, 1), 7.0)
+    ratio[6:8], ratio[6, :4] = 1.5, 1000.0  # two of the three rows that count
+    photo, alpha = np.ones((5, SIZE, SIZE, 4), np.float32), np.ones((SIZE, SIZE), np.float32)
+    photo[..., :3], photo[:, 9:12, :, 3], alpha[12:] = linear_to_srgb(seen), 0.9, 0.9
+    found = {"rgb": linear_to_srgb(seen[0] / 2 / ratio * np.float32([0.5, 0.5, 2.0])), "alpha": alpha}
+    data = replace(views, images=photo).exposed(np.full(5, 2.0))
+    exposures = scoring.exposed_like(data, [found] * 4 + [found | {"alpha": 0 * alpha}]).exposures
+    assert exposures[:, 1] == pytest.approx([3.0, 3.0, 3.0, 3.0, 2.0], rel=1e-3)
 
 
 # ---- the sheet of pictures ----
@@ -360,13 +333,8 @@ def test_an_asset_is_scored_by_the_test_views_with_the_light_beside_it(data_with
 
 def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, tmp_path, monkeypatch):
     """On white by its own coverage, scaled by the headline's factor; normals where the truth is known."""
-    shown = {}
-
-    def noted(heads, rows):
-        shown.update(heads=heads, rows=dict(rows))
-        return picture_grid(heads, rows)
-
-    monkeypatch.setattr(sheet, "picture_grid", noted)
+    shown = []
+    monkeypatch.setattr(sheet, "picture_grid", lambda *asked: shown.append(asked) or picture_grid(*asked))
     data = asset_views.select([0, 1, 2, 0, 1])
     grey = np.full((HEIGHT, WIDTH), 0.25, np.float32)
     colour = np.repeat(grey[..., None], 3, axis=-1)
@@ -381,9 +349,9 @@ def test_the_sheet_shows_each_quantity_as_it_is_scored(asset_views, tmp_path, mo
     evaluation = {"relight": {"lsq": {"scale": [2.0] * 3}}, "albedo": {"lsq": {"scale": [0.5, 1.0, 2.0]}}}
     relit = RelitViews({"day": images}, data, 1)
     write_sheet(tmp_path / "s.png", Evaluated(evaluation, data, [prediction] * 5, truths, relit))
-    rows = shown["rows"]
+    heads, rows = shown[0][0], dict(shown[0][1])
     assert list(rows) == ["novel view", "relit by\nday", "albedo", "roughness", "metallic", "normal"]
-    assert [head.split(":")[0] for head in shown["heads"]] == ["r_0"] * 3 + ["r_2"] * 3 + ["r_1"] * 3
+    assert [head.split(":")[0] for head in heads] == ["r_0"] * 3 + ["r_2"] * 3 + ["r_1"] * 3
 
     def on_white(linear, coverage):
         return over_background(np.clip(linear_to_srgb(np.float32(linear)), 0, 1), np.float32(coverage))

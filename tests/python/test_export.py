@@ -68,15 +68,9 @@ def asset(ball):
     vertices, faces, normals, _ = ball
     rng = np.random.default_rng(0)
     uv = rng.random((len(vertices), 2)).astype(np.float32)
-    material = Material(
-        "paint",
-        (0.5, 0.25, 1.0),
-        0.9,
-        0.8,
-        albedo_texture=rng.random((8, 8, 3)).astype(np.float32),
-        roughness_metallic_texture=rng.random((8, 8, 2)).astype(np.float32),
-        normal_texture=np.float32(np.dstack([np.full((8, 8), 0.6), np.zeros((8, 8)), np.full((8, 8), 0.8)])),
-    )
+    albedo, gloss = (rng.random((8, 8, n)).astype(np.float32) for n in (3, 2))
+    normal = np.broadcast_to(np.float32([0.6, 0, 0.8]), (8, 8, 3))
+    material = Material("paint", (0.5, 0.25, 1.0), 0.9, 0.8, (0, 0, 0), albedo, gloss, normal)
     vertices, normals, faces = np.float32(vertices), np.float32(normals), np.int32(faces)
     tangents = vertex_tangents(vertices, faces, normals, uv)
     return Asset("ball", vertices, faces, normals, np.zeros(len(faces), np.int32), [material], uv, tangents)
@@ -90,6 +84,7 @@ def image_of(document, binary, index):
 
 def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     occlusion = np.random.default_rng(1).random((8, 8)).astype(np.float32)
+    asset.colors = np.random.default_rng(2).random((len(asset.vertices), 3)).astype(np.float32)
     write_glb(tmp_path / "a.glb", asset, occlusion)
     document, arrays, binary = parse_glb(tmp_path / "a.glb")
     to_file = lambda v: v[:, [0, 2, 1]] * [1, 1, -1]  # noqa: E731 - +z in the world is +y in the file
@@ -97,6 +92,7 @@ def test_glb_is_y_up_with_textures_in_their_colour_spaces(tmp_path, asset):
     assert arrays["NORMAL"] == pytest.approx(to_file(asset.normals), abs=1e-6)
     assert arrays["TANGENT"][:, :3] == pytest.approx(to_file(asset.tangents[:, :3]), abs=1e-6)
     assert np.array_equal(arrays["TANGENT"][:, 3], asset.tangents[:, 3])
+    assert np.array_equal(arrays["COLOR_0"], asset.colors)
     assert arrays["TEXCOORD_0"] == pytest.approx(asset.uv, abs=1e-6)
     assert np.array_equal(arrays["indices"].reshape(-1, 3), asset.triangles)
     material = document["materials"][0]

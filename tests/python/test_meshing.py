@@ -9,20 +9,13 @@ import torch
 import trimesh
 from splitnerf.export import simplify
 from splitnerf.export.meshing import EmptyMesh, extract_mesh
-from splitnerf.export.simplify import (
-    capped,
-    decimate,
-    drop_floaters_and_cavities,
-    drop_unseen,
-    is_closed,
-    split_pinches,
-)
+from splitnerf.export.simplify import capped, decimate, drop_floaters_and_cavities, drop_unseen, is_closed
 from splitnerf.export.textured import textured_asset
 from splitnerf.ops import MeshScene
-from splitnerf.render.seen import GRAZING, Cameras, in_view, majority, seen_vertices
+from splitnerf.render.seen import Cameras, in_view, majority, seen_vertices
 from test_bake import ball
 
-RADIUS = 0.7
+RADIUS, DISTANCE = 0.7, 3.0  # of the sphere; of a camera above it
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
@@ -126,11 +119,12 @@ def test_a_cavity_goes_and_a_part_beside_stays():
 
 
 def test_faces_that_share_any_vertex_are_one_component():
-    """150 that meet in their last corner, and one for itself."""
+    """150 that meet in their last corner; two beside them stay, as they are more than a hundredth, and one goes."""
     pairs = np.arange(300).reshape(-1, 2)
-    faces = np.concatenate([np.column_stack([pairs, np.full(150, 300)]), [[301, 302, 303]]])
-    vertices, kept, n_dropped = drop_floaters_and_cavities(np.zeros((304, 3), np.float32), faces)
-    assert n_dropped == 1 and len(kept) == 150 and len(vertices) == 301
+    others = [[301, 302, 303], [304, 305, 306], [306, 307, 308]]
+    faces = np.concatenate([np.column_stack([pairs, np.full(150, 300)]), others])
+    vertices, kept, n_dropped = drop_floaters_and_cavities(np.zeros((309, 3), np.float32), faces)
+    assert n_dropped == 1 and len(kept) == 152 and len(vertices) == 306
 
 
 def test_decimation_keeps_a_thin_shape_closed():
@@ -148,8 +142,7 @@ def test_decimation_keeps_a_thin_shape_closed():
 
 def test_closed_means_each_edge_once_in_each_direction():
     faces = TETRAHEDRON
-    assert is_closed(faces)
-    assert not is_closed(faces[:3])
+    assert is_closed(faces) and not is_closed(faces[:3])
     assert not is_closed(np.concatenate([faces[:3], faces[3:, ::-1]]))
     assert not is_closed(np.concatenate([faces, faces]))
 
@@ -163,10 +156,10 @@ def test_parts_that_touch_are_split(n_shared):
         faces = np.stack([TETRAHEDRON, other], axis=1).reshape(-1, 3)  # in turn, so that no order tells them apart
         if turned is not None:
             faces[turned] = faces[turned, ::-1]
-        split_vertices, split_faces = split_pinches(vertices, faces)
+        split_vertices, split_faces = simplify.split_pinches(vertices, faces)
         assert len(split_vertices) == 8 and is_closed(split_faces) == (turned is None)
         np.testing.assert_array_equal(split_vertices[split_faces], vertices[faces])
-        assert len(split_pinches(split_vertices, split_faces)[0]) == 8
+        assert len(simplify.split_pinches(split_vertices, split_faces)[0]) == 8
 
 
 def test_decimation_parts_what_touches_and_drops_sheets_without_volume(monkeypatch):
@@ -181,9 +174,6 @@ def test_decimation_parts_what_touches_and_drops_sheets_without_volume(monkeypat
 
 
 # ---- what photos show ----
-
-
-DISTANCE = 3.0
 
 
 def from_above(focal: float = 100.0, centre: tuple[float, float] = (50.0, 50.0), size: tuple[int, int] = (100, 100)):
@@ -202,12 +192,12 @@ def seen(mesh: trimesh.Trimesh, cameras: Cameras) -> np.ndarray:
 
 
 def test_a_camera_sees_the_cap_of_a_sphere():
-    """Those whose normal is within acos(GRAZING) of the line to the camera; the mesh's own faces are left a margin."""
+    """Those whose normal is within acos(0.05) of the line to the camera; the mesh's own faces are left a margin."""
     mesh = round_body(1.0)
     to_camera = np.array([0, 0, DISTANCE]) - mesh.vertices
     cosine = (to_camera * mesh.vertices).sum(1) / np.linalg.norm(to_camera, axis=1)
     found = seen(mesh, from_above())
-    assert found[cosine > GRAZING + 0.03].all() and not found[cosine < GRAZING - 0.03].any()
+    assert found[cosine > 0.08].all() and not found[cosine < 0.02].any()
 
 
 @pytest.mark.parametrize("offset", [1e-3, 0.1])
@@ -255,6 +245,8 @@ def test_one_ray_that_slips_through_shows_nothing():
     half, one = mesh.vertices[:, 2] > 0.1, np.arange(len(mesh.vertices)) == 500
     assert not majority(mesh.faces, one).any() and majority(mesh.faces, ~one).all()
     assert (majority(mesh.faces, half) == half).mean() > 0.99
+    for flags in np.array([[1, 1, 0, 0, 0], [0, 1, 1, 1, 0]], bool):  # as many for it as against it: it stays
+        assert majority(np.array([[0, 1, 2], [0, 3, 4]]), flags)[0] == flags[0]
 
 
 def test_behind_a_camera_nothing_is_seen():
@@ -295,11 +287,11 @@ def test_what_lies_behind_a_narrow_hole_is_cut_out():
 
 
 def test_a_body_that_no_photo_shows_goes():
-    """Or of which a twentieth is shown. Where nothing is shown at all, all stays, and nothing becomes a cap."""
+    """Or of which an eleventh is shown, but not a ninth. Where nothing is shown at all, all stays, and nothing becomes a cap."""
     mesh = round_body(0.5) + round_body(0.5, 2.0)
     n = len(mesh.vertices) // 2
     number = np.arange(2 * n)
-    for shown, left in ((n, 1), (n + n // 20, 1), (n + n // 5, 2), (2 * n, 2), (0, 2)):
+    for shown, left in ((n, 1), (n + n // 11, 1), (n + n // 9, 2), (2 * n, 2), (0, 2)):
         vertices, faces, seen, dropped = drop_unseen(np.float32(mesh.vertices), mesh.faces, number < shown)
         assert (len(vertices), len(faces), dropped) == (left * n, left * len(mesh.faces) // 2, 2 - left)
         assert np.array_equal(vertices, np.float32(mesh.vertices[: left * n])) and is_closed(faces)
@@ -319,7 +311,7 @@ def test_a_cap_keeps_its_places_and_normals():
 
     vertices, faces = np.float32(mesh.vertices), np.int32(mesh.faces)
     leans = dataclasses.replace(surface, materials=leaning)
-    sizes = {"n_faces": 0, "texture_size": 128, "spacing": 0.05, "occlusion_offset": 0.01}
+    sizes = {"n_faces": 0, "texture_size": 128, "spacing": 0.0125, "occlusion_offset": 0.01}
     found, *_ = textured_asset("ball", vertices, faces, leans, **sizes, on_surface=mesh.vertices[:, 2] > 0)
     radius, up = np.linalg.norm(found.vertices, axis=1), found.vertices[:, 2]
     assert radius[up > 0.1] == pytest.approx(0.8, abs=1e-4) and radius[up < -0.01] == pytest.approx(0.82, abs=1e-6)

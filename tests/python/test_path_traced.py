@@ -12,6 +12,7 @@ import pytest
 import torch
 import trimesh
 from mesh_shapes import scene_of
+from op_checks import generator, unit
 from splitnerf import _core
 from splitnerf.data.asset import Asset, Material
 from splitnerf.data.environment import read_environment
@@ -30,16 +31,10 @@ FROM_ABOVE = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4.0]])
 
 def square(material: Material) -> Asset:
     """[-1, 1]^2 at z = 0, its texture upright when seen from above."""
-    return Asset(
-        "square",
-        np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
-        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
-        np.tile(np.array([0, 0, 1], np.float32), (4, 1)),
-        np.zeros(2, np.int32),
-        [material],
-        uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32),
-        tangents=np.tile(np.array([1, 0, 0, 1], np.float32), (4, 1)),
-    )
+    vertices, faces = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.int32([[0, 1, 2], [0, 2, 3]])
+    uv, up, tangents = [[0, 1], [1, 1], [1, 0], [0, 0]], [[0, 0, 1]] * 4, np.float32([[1, 0, 0, 1]] * 4)
+    arrays = np.float32(vertices), faces, np.float32(up), np.zeros(2, np.int32)
+    return Asset("square", *arrays, [material], uv=np.float32(uv), tangents=tangents)
 
 
 def render(asset: Asset, light: float = 1.0, **options) -> dict[str, np.ndarray]:
@@ -50,9 +45,11 @@ def render(asset: Asset, light: float = 1.0, **options) -> dict[str, np.ndarray]
 
 
 def test_colours_of_vertices_multiply_the_material():
-    asset = square(Material(albedo=(0.5, 1.0, 1.0)))
+    asset = square(Material(albedo=(0.5, 1.0, 1.0), roughness=0.6, metallic=0.3))
     asset.colors = np.tile(np.array([0.5, 0.25, 1], np.float32), (4, 1))
-    assert render(asset, spp=4)["albedo"][8, 8] == pytest.approx([0.25, 0.25, 1])
+    maps = render(asset, spp=4)
+    assert maps["albedo"][8, 8] == pytest.approx([0.25, 0.25, 1])
+    assert [maps[name][8, 8] for name in ("roughness", "metallic")] == pytest.approx([0.6, 0.3])
 
 
 def test_triangles_have_their_own_materials_and_normals_their_tilt():
@@ -82,7 +79,9 @@ def test_bounces_and_their_bound_are_as_asked():
     """More bounces are brighter; indirect light of 40 is clamped to 10 unless that is not asked for, as is the default."""
     asset = trough()
     levels = {n: render(asset, light=1.0, spp=64, bounces=n)["radiance"].mean() for n in (0, 1, 4)}
-    assert levels[0] < 0.8 * levels[1] < 0.8 * levels[4] and render(asset, spp=64)["radiance"].mean() == levels[4]
+    assert levels[0] < 0.8 * levels[1] < 0.8 * levels[4]
+    wide = render(asset, spp=64, pixel_filter="blackman-harris")["radiance"]
+    assert np.array_equal(render(asset, spp=64)["radiance"], wide) and wide.mean() == levels[4]
     bright = {c: render(asset, light=40.0, spp=64, clamp_indirect=c)["radiance"].mean() for c in (0.0, 10.0)}
     assert bright[0.0] == pytest.approx(40 * levels[4], rel=0.05) and bright[10.0] < 0.8 * bright[0.0]
     assert render(asset, light=40.0, spp=64)["radiance"].mean() == bright[10.0]
@@ -104,14 +103,9 @@ def test_looks_as_in_blender(scene, least):
     truth = read_image(folder / "test" / "r_000_relit_sunset.png")
     height, width = truth.shape[:2]
     focal = 0.5 * width / np.tan(0.5 * meta["camera_angle_x"])
-    maps = AssetRenderer(read_asset(folder / "asset.glb")).render(
-        read_environment(folder / "relight_sunset.hdr"),
-        np.array(meta["frames"][0]["transform_matrix"]),
-        (focal, focal, width / 2, height / 2),
-        width,
-        height,
-        spp=64,
-    )
+    camera = np.array(meta["frames"][0]["transform_matrix"]), (focal, focal, width / 2, height / 2), width, height
+    light = read_environment(folder / "relight_sunset.hdr")
+    maps = AssetRenderer(read_asset(folder / "asset.glb")).render(light, *camera, spp=64)
     straight = maps["radiance"] / np.maximum(maps["alpha"], 1e-8)[..., None]
     image = over_background(np.clip(linear_to_srgb(straight), 0, 1), maps["alpha"])
     assert psnr(image, over_background(truth[..., :3], truth[..., 3])) > least
@@ -148,6 +142,7 @@ def test_a_signal_ends_a_rendering():
 
 BAD = [math.nan, math.inf, -math.inf, 1e19, 3e38]
 DOWN, ABOVE = torch.tensor([0.0, 0.0, -1.0]), torch.tensor([0.0, 0.0, 3.0])
+NORMALS, OTHERS = unit(torch.randn(20, 3, generator=generator(0))), torch.arange(20) != 4
 
 
 # ---- numbers that would end the process: refused, or meet nothing ----
@@ -200,30 +195,24 @@ def test_rays_end_at_their_length_and_lengths_that_are_none_meet_nothing(ball, t
 
 @pytest.mark.parametrize("value", BAD)
 def test_points_that_are_none_leave_the_factors_of_others_alone(ball, value):
-    normals = torch.nn.functional.normalize(torch.randn(20, 3, generator=torch.Generator().manual_seed(0)), dim=1)
-    inputs = {name: 1.0 * normals for name in ("positions", "normals", "lobe_dirs")}
-    light = {"roughness": torch.full((20, 1), 0.5), "environment": torch.ones(4, 8, 3)}
-    good = occlusion_factors(ball, **inputs, **light, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
-    for name in inputs:
-        changed = {key: part.clone() for key, part in inputs.items()}
-        changed[name][4, 0] = value
-        found = occlusion_factors(ball, **changed, **light, n_diffuse_rays=16, n_specular_rays=16, offset=0.01, seed=1)
-        others = torch.arange(20) != 4
-        assert all(torch.equal(a[others], b[others]) for a, b in zip(good, found))
+    inputs = {name: NORMALS.clone() for name in ("positions", "normals", "lobe_dirs")}
+    inputs |= {"roughness": torch.full((20, 1), 0.5), "environment": torch.ones(4, 8, 3), "offset": 0.01}
+    inputs |= {"n_diffuse_rays": 16, "n_specular_rays": 16, "seed": 1}
+    factors = lambda **changed: occlusion_factors(ball, **inputs | changed)
+    for name in ("positions", "normals", "lobe_dirs"):
+        changed = NORMALS.clone()
+        changed[4, 0] = value
+        assert all(torch.equal(a[OTHERS], b[OTHERS]) for a, b in zip(factors(), factors(**{name: changed})))
     if math.isfinite(value):
-        far = occlusion_factors(ball, **inputs, **light, n_diffuse_rays=16, n_specular_rays=16, offset=value, seed=1)
-        assert all((part > 0.999).all() for part in far)  # nothing is met from there
+        assert all((part > 0.999).all() for part in factors(offset=value))  # nothing is met from there
 
 
 @pytest.mark.parametrize("value", BAD)
 def test_bits_of_points_that_are_none(ball, value):
     """They are open wherever they count; those of others are as they were."""
-    normals = torch.nn.functional.normalize(torch.randn(20, 3, generator=torch.Generator().manual_seed(0)), dim=1)
-    directions = torch.nn.functional.normalize(torch.randn(64, 3, generator=torch.Generator().manual_seed(1)), dim=1)
-    good, hits = lib.visibility_bits(ball.handle, 0.5 * normals, normals, directions, 0.01, True)
-    points = 0.5 * normals
+    points, directions = 0.5 * NORMALS, unit(torch.randn(64, 3, generator=generator(1)))
+    good, hits = lib.visibility_bits(ball.handle, points, NORMALS, directions, 0.01, True)
     points[4, 0] = value
-    found, their_hits = lib.visibility_bits(ball.handle, points, normals, directions, 0.01, True)
-    others = torch.arange(20) != 4
-    assert torch.equal(good[others], found[others]) and torch.equal(hits[others], their_hits[others])
+    found, their_hits = lib.visibility_bits(ball.handle, points, NORMALS, directions, 0.01, True)
+    assert torch.equal(good[OTHERS], found[OTHERS]) and torch.equal(hits[OTHERS], their_hits[OTHERS])
     assert bit_counts(found[4:5, 1]) == 0 and (their_hits[4] < 0).all() and bit_counts(good[4:5, 1]) > 0

@@ -290,10 +290,14 @@ def test_the_object_comes_first_then_what_was_promised_then_scores(tmp_path, glb
 def test_scores_are_said_in_words():
     """Higher is better, lower is better; the limits belong to the better word; what is missing has no row."""
     words = "good", "good", "fair", "fair", "poor"
-    rows = [({"novel_view": {"psnr": value}}, word) for value, word in zip((35.0, 30.0, 29.9, 25.0, 24.9), words)]
-    rows += [({"normal_mae_deg": value}, word) for value, word in zip((1.0, 5.0, 5.1, 12.0, 12.1), words)]
-    for evaluation, word in rows:
-        assert [row["word"] for row in graded(evaluation | {"relight": None, "f_score": None})] == [word], evaluation
+    limits = {"novel_view": (30, 25), "relight": (29, 24), "albedo": (27, 22), "light_psnr": (22, 17)}
+    limits |= {"normal_mae_deg": (5, 12), "roughness_mae": (0.08, 0.16), "f_score": (0.9, 0.7)}
+    for name, (good, poor) in (limits | {"metallic_balanced_accuracy": (0.95, 0.8)}).items():
+        step = 1e-3 * (good - poor)
+        for value, word in zip((good + step, good, good - step, poor, poor - step), words):
+            score = {"psnr": value} if name in ("novel_view", "relight", "albedo") else value
+            found = graded({"relight": None, "f_score": None, name: score})
+            assert [row["word"] for row in found] == [word], (name, value)
     (angle,) = graded({"normal_mae_deg": 7.12345})
     said = angle["name"], angle["value"], angle["scale"]
     assert said == ("Normals", "7.1° off", "good up to 5° off, poor above 12° off")

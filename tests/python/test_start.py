@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,21 +10,13 @@ import pytest
 import torch
 import trimesh
 from splitnerf.config import preset
-from splitnerf.data.dataset import load_dataset
+from splitnerf.data.dataset import Dataset, load_dataset
 from splitnerf.fields import SdfField
 from splitnerf.ops import HashGridSpec
 from splitnerf.render import stereo
 from splitnerf.training import loop, start
 from splitnerf.training.loop import begun
-from splitnerf.training.start import (
-    CLEAR_SHARE,
-    MARGIN,
-    NEAR_CELLS,
-    StartShape,
-    exact_distances,
-    fit_to,
-    surface_depths,
-)
+from splitnerf.training.start import StartShape, exact_distances, fit_to, surface_depths
 from splitnerf_tools.synth.rendering import spiral
 from tiny_runs import tiny, train_scene
 
@@ -85,6 +78,28 @@ def found(box_photos) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     return stereo.depth_maps(box_photos[0], hull(), BOX)
 
 
+def test_photos_are_compared_small_grey_and_within_their_masks():
+    """Averaged by a whole factor of their shorter edge, with the lens of what is left; some evenly spread ones get depths."""
+    images = np.full((5, 21, 33, 4), [0.2, 0.4, 0.9, 0.0], np.float32)
+    images[:, :, :16, 3], images[:, :, 16, 3] = 1.0, 0.8  # 0.4 of the ninth block
+    poses, lens = np.tile(np.eye(4, dtype=np.float32), (5, 1, 1)), np.tile(np.float32([40, 44, 16, 10]), (5, 1))
+    poses[:, 0, 3] = np.arange(5)
+    data = Dataset("a", Path(), "train", 1, images, poses, lens, list("abcde"), [Path()] * 5, np.eye(4))
+    found = stereo.grey_photos(data, edge=10)
+    columns = np.float32([0.5] * 8 + [0.2] + [0] * 7)
+    np.testing.assert_allclose(found.grey, np.broadcast_to(columns, (5, 10, 16)), atol=1e-3)
+    assert torch.equal(found.masks, torch.from_numpy(columns > 0.3).expand(5, 10, 16))
+    assert found.intrinsics[0].tolist() == [20, 22, 8, 5] and found.spread(3).poses[:, 0, 3].tolist() == [0, 2, 4]
+
+
+def test_photos_are_compared_with_those_at_a_fair_angle():
+    """At most six, from 4 to 45 degrees away as seen from the origin, the nearest to 15 degrees first."""
+    angle = torch.tensor([0.0, 2, 10, 16, 30, 44, 50, -13.5, -22, -35]).deg2rad()
+    poses = torch.eye(4).repeat(10, 1, 1)
+    poses[:, :3, 3] = 3 * torch.stack([angle.cos(), angle.sin(), 0 * angle], 1)
+    assert [stereo._neighbours(poses, i) for i in (0, 6)] == [[3, 7, 2, 8, 4, 9], [4, 5, 3, 2]]
+
+
 def test_stereo_finds_the_depths_of_a_textured_cavity(box_photos, found):
     depths, scores, _ = found
     known = (scores > 0.7) & (box_photos[1] > 0)
@@ -96,10 +111,10 @@ def test_stereo_finds_the_depths_of_a_textured_cavity(box_photos, found):
 
 def test_depths_of_texture_stand_out_and_those_of_a_slow_gradient_do_not(box_photos, found):
     n_pixels = box_photos[0].masks.sum()
-    assert (found[2] > MARGIN).sum() > (CLEAR_SHARE + 0.2) * n_pixels
+    assert (found[2] > start.MARGIN).sum() > (start.CLEAR_SHARE + 0.2) * n_pixels
     rows = torch.linspace(0.4, 0.6, SIZE)[:, None].expand(SIZE, SIZE)
     plain = box_photos[0]._replace(grey=rows * box_photos[0].masks)
-    assert (stereo.depth_maps(plain, hull(), BOX)[2] > MARGIN).sum() < 0.5 * CLEAR_SHARE * n_pixels
+    assert (stereo.depth_maps(plain, hull(), BOX)[2] > start.MARGIN).sum() < 0.5 * start.CLEAR_SHARE * n_pixels
 
 
 @pytest.mark.parametrize("size", [199, 200])
@@ -127,7 +142,7 @@ def test_grain_that_large_photos_show_alone_opens_a_cavity(size, monkeypatch):
 def test_a_solid_object_begins_with_a_sphere_however_clear_its_depths(monkeypatch):
     block = trimesh.creation.box(bounds=[[-0.6] * 3, [0.6] * 3])
     photos = photographed(24, 50, 18.0, block)[0]
-    assert (stereo.depth_maps(photos, hull(), BOX)[2] > MARGIN).sum() > CLEAR_SHARE * photos.masks.sum()
+    assert (stereo.depth_maps(photos, hull(), BOX)[2] > start.MARGIN).sum() > start.CLEAR_SHARE * photos.masks.sum()
     monkeypatch.setattr(start, "grey_photos", lambda *_: photos)
     assert start.start_shape(SimpleNamespace(height=50, width=50), hull(), preset("cpu")) is None
 
@@ -139,7 +154,7 @@ def test_what_a_mirror_shows_is_no_surface(mirrored, monkeypatch):
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.6)
     what = (24, 50, 6.0, ball, 1.0) if mirrored else (24, 50, 18.0)
     photos = photographed(*what)[0]
-    assert (stereo.depth_maps(photos, hull(), BOX)[2] > MARGIN).sum() > CLEAR_SHARE * photos.masks.sum()
+    assert (stereo.depth_maps(photos, hull(), BOX)[2] > start.MARGIN).sum() > start.CLEAR_SHARE * photos.masks.sum()
     monkeypatch.setattr(start, "grey_photos", lambda *_: photos)
     monkeypatch.setattr(start, "PASSES", start.PASSES[1:4] + start.PASSES[5:])
     monkeypatch.setattr(start, "FULL", 0.7)  # this box has thick walls
@@ -255,7 +270,7 @@ def test_truncated_distances_become_those_of_the_ball_and_crumbs_go():
     true = ball(0.8)
     crumb = torch.minimum(true, ball(0.1, (1.2, 1.2, 1.2)))
     found = exact_distances(crumb.clamp(-0.1, 0.1), BOX)
-    near = true.abs() < NEAR_CELLS * 2 * BOX / len(true)
+    near = true.abs() < start.NEAR_CELLS * 2 * BOX / len(true)
     assert (found - true)[near].abs().max() < 0.02
     assert (found - true).abs().max() < 0.8 * 2 * BOX / len(true)
 
