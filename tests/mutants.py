@@ -56,7 +56,7 @@ TESTS = {
     "splitnerf_tools/doctor/": "test_doctor.py",
     "splitnerf_tools/inspection/": "test_inspect.py",
     "splitnerf_tools/report/": "test_report.py test_report_page.py",
-    "splitnerf_tools/separation/": "test_separation.py",
+    "splitnerf_tools/separation/": "test_separation.py test_radiance_field.py",
     "splitnerf_tools/synth/": "test_synth.py",
     "splitnerf_tools/view/": "test_view.py test_live.py",
     "render/": "test_views.py test_shading_model.py test_summed_light.py",

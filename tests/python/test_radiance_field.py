@@ -1,25 +1,15 @@
 """The radiance field of a whole place: its parts by closed forms."""
 
+import math
+
 import pytest
 import torch
-from splitnerf_tools.separation.field import (
-    RadianceField,
-    RayMeasure,
-    Rendered,
-    contracted,
-    resampled,
-    search_loss,
-    spread_loss,
-    with_less_gradient,
-)
+from splitnerf_tools.separation import field as fields
+from splitnerf_tools.separation.field import RadianceField, RayMeasure, Rendered, resampled, search_loss, spread_loss
 
 
-def rendered(weights, edges, first_weights=None, first_edges=None):
-    weights, edges = torch.tensor([weights]), torch.tensor([edges])
-    first = (
-        (weights if first_weights is None else torch.tensor([first_weights])),
-        (edges if first_edges is None else torch.tensor([first_edges])),
-    )
+def rendered(weights, edges, *first):
+    weights, edges, *first = (torch.tensor([x]) for x in (weights, edges, *(first or (weights, edges))))
     return Rendered(torch.zeros(1, 3), weights, edges[:, 1:], edges, *first)
 
 
@@ -30,10 +20,33 @@ def test_the_grids_reach_from_their_coarsest_cells_to_their_finest():
 
 
 def test_contraction():
-    inside = torch.tensor([[0.3, -0.2, 0.5]])
-    assert torch.equal(contracted(inside), inside)
-    far = contracted(torch.tensor([[0.0, 4.0, 0.0], [1e6, 0, 0]]))
-    torch.testing.assert_close(far, torch.tensor([[0.0, 1.75, 0.0], [2.0, 0, 0]]))
+    """All of space goes into the ball of radius 2, and that ball into the grid's unit cube."""
+    points = torch.tensor([[0.3, -0.2, 0.5], [0.0, 4.0, 0.0], [1e6, 0, 0]])
+    short = torch.tensor([[0.3, -0.2, 0.5], [0.0, 1.75, 0.0], [2.0, 0, 0]])
+    torch.testing.assert_close(fields.contracted(points), short)
+    torch.testing.assert_close(RadianceField._encoded(lambda unit: unit, points), short / 4 + 0.5)
+
+
+@pytest.mark.parametrize("jitter, hidden", [(False, None), (True, None), (False, lambda points: points[..., 0] > 0)])
+def test_even_fog_of_one_colour(jitter, hidden):
+    """Light falls exponentially from the near limit on, but in hidden space; the last sample takes the rest. The samples' random
+    places are within their intervals."""
+    field, o, d = RadianceField(), torch.tensor([[3.0, 0, 0], [0, 2, 0]]), torch.tensor([[-1.0, 0, 0], [0, 1, 0]])
+    thin = 2.5 + math.log(0.4)
+    with torch.no_grad():
+        for layer, bias in (field.first[2], thin), (field.trunk[2], thin), (field.head[4], 1):
+            layer.weight.zero_(), layer.bias.fill_(bias)
+        got = field.render(o, d, 32, 16, jitter, hidden)
+    measure = RayMeasure(o, d)
+    for weights, edges in (got.weights, got.edges), (got.first_weights, got.first_edges):
+        fog = 0.4 * (measure.points(edges)[..., 0] <= (1e9 if hidden is None else 0))
+        gone = (fog * measure.distances(edges).diff()).cumsum(1)[:, :-1]
+        torch.testing.assert_close(weights.cumsum(1)[:, :-1], 1 - torch.exp(-gone), atol=1e-5, rtol=1e-4)
+        torch.testing.assert_close(weights.sum(1), torch.ones(2))
+    torch.testing.assert_close(got.distances, measure.distances(got.edges[:, 1:] - 0.5 * got.edges.diff()))
+    torch.testing.assert_close(got.colour, torch.full((2, 3), 1 / (1 + math.exp(-1))), atol=2e-3, rtol=0)
+    apart = float((got.first_edges - torch.linspace(0, 1, 33)).abs().max()) * 32
+    assert (got.edges.diff() >= 0).all() and (0.4 < apart < 0.5 if jitter else apart == 0)
 
 
 def test_steps_are_even_near_the_middle_and_grow_with_the_distance():
@@ -71,20 +84,7 @@ def test_search_must_bound_the_samples():
 
 def test_gradients_fall_near_the_camera():
     values = torch.ones(1, 3, 1, requires_grad=True)
-    out = with_less_gradient(values, torch.tensor([[0.15, 0.75, 3.0]]))
+    out = fields.with_less_gradient(values, torch.tensor([[0.15, 0.75, 3.0]]))
     assert torch.equal(out, values)
     out.sum().backward()
     torch.testing.assert_close(values.grad[0, :, 0], torch.tensor([0.01, 0.25, 1.0]))
-
-
-def test_weights_sum_to_one_and_hidden_space_has_none():
-    torch.manual_seed(0)
-    field, o, d = RadianceField(), torch.tensor([[3.0, 0, 0]]), torch.tensor([[-1.0, 0, 0]])
-    with torch.no_grad():
-        field.trunk[2].bias[0] = 8.0  # fog everywhere
-        fog = field.render(o, d, 32, 16)
-        behind = field.render(o, d, 32, 16, hidden=lambda points: points[..., 0] > 0)
-    assert float(fog.weights.sum()) == pytest.approx(1, abs=1e-5)
-    assert float(fog.distances[0, fog.weights.argmax()]) < 1
-    assert float(behind.weights.sum()) == pytest.approx(1, abs=1e-5)
-    assert float(behind.distances[0, behind.weights.argmax()]) > 3
