@@ -62,7 +62,7 @@ class TestRegion:
     def test_parts_count_by_their_size_and_place(self, table):
         """A tube and what stands over it, not what stands apart, a speck, or cells of one point; filled, larger, down to a table."""
         cells = np.zeros((6, *(CELLS,) * 3), bool)
-        cells[0, 33:63, 33:63, 44:56] = cells[1, 50:56, 50:56, 70:75] = cells[2, 70:76, 45:51, 45:50] = True
+        cells[0, 33:63, 33:63, 44:56] = cells[1, 58:64, 50:56, 64:69] = cells[2, 70:76, 45:51, 45:50] = True
         cells[3, 40:45, 40:45, 64:69] = cells[4, 36:42, 50:56, 72:75] = cells[5, 86:94, 10:86, 44:60] = True
         cells[0, 35:61, 35:61], cells[5, 2:94, 2:94, 38:40] = False, table is not None
         tube, over, apart, speck, vague, far = (Region(part, None).centres().numpy() for part in cells)
@@ -72,9 +72,9 @@ class TestRegion:
         held = [bool(region.holds(torch.from_numpy(part.mean(0)))) for part in (tube, over, apart, speck, vague)]
         assert held == [True, True, False, False, False]
         assert region.holds(torch.tensor([[-0.45, 0, 0.31], [-0.45, 0, 0.34]])).tolist() == [True, False]
-        below = torch.tensor([[0.18, 0.18, 0.37], [-0.45, 0, -0.26], [-0.45, 0, -0.28]])
-        assert region.holds(below).tolist() == [table is not None, table is not None, False]
-        down = torch.tensor([[-0.48, 0, 3.0], [0.18, 0.18, 3.0]]), torch.tensor([[1e-9, 1e-9, -1.0]] * 2)
+        below = torch.tensor([[0.475, 0.18, 0.417], [-0.45, 0, -0.26], [-0.45, 0, -0.28], [-0.9, 0, -0.25]])
+        assert region.holds(below).tolist() == [table is not None, table is not None, False, False]
+        down = torch.tensor([[-0.48, 0, 3.0], [0.35, 0.18, 3.0]]), torch.tensor([[1e-9, 1e-9, -1.0]] * 2)
         assert region.blocks(*down).tolist() == [True, False]  # only one photo shows the other part
 
     def test_a_wall_is_looked_for_where_there_is_no_table(self):
