@@ -21,17 +21,9 @@ from splitnerf.data.environment import read_environment
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import srgb_to_linear
 from splitnerf.data.truth import OPAQUE, ViewTruth, load_scene_truth, load_view_truths
-from splitnerf.evaluate import metrics
+from splitnerf.evaluate import metrics, scoring
 from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, on_white, scaled_scores
-from splitnerf.evaluate.scoring import (
-    Protocol,
-    RelitViews,
-    asset_predictions,
-    choose_views,
-    environment_beside,
-    relight,
-    relight_scores,
-)
+from splitnerf.evaluate.scoring import Protocol, RelitViews, asset_predictions, choose_views, relight, relight_scores
 from splitnerf.relight.rendering import asset_of
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.provenance import header, provenance
@@ -164,7 +156,7 @@ def load_scene(root: Path, light: Path | None, truth: Asset, protocol: Protocol)
 def section(run: Path, root: Path, protocol: Protocol, texture: int) -> str:
     """The scene's table as markdown, its rows printed as they come."""
     ours, truth = asset_of(run), read_asset(root / "asset.glb")
-    scene = load_scene(root, environment_beside(run / "mesh.glb" if run.is_dir() else run), truth, protocol)
+    scene = load_scene(root, scoring.environment_beside(run / "mesh.glb" if run.is_dir() else run), truth, protocol)
     canvases = {"ours": Canvas(ours, truth, texture), "true": Canvas(truth, ours, texture)}
     light = scene.lights["novel"]
     light_error = "none" if light is None else f"{metrics.light_psnr(light, scene.lights['novel_true']):.1f} dB"

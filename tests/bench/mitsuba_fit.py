@@ -40,16 +40,13 @@ def scene_of(mi, asset, maps: dict[str, np.ndarray], light: np.ndarray):
         for name, image in maps.items()
     }
     bsdf |= {"type": "principled", "specular": 0.5}
+    around = mi.Bitmap(light.astype(np.float32))
     return mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "prb", "max_depth": 4},
             "object": {"type": "ply", "filename": str(file), "bsdf": {"type": "twosided", "bsdf": bsdf}},
-            "light": {
-                "type": "envmap",
-                "bitmap": mi.Bitmap(light.astype(np.float32)),
-                "to_world": mi.ScalarTransform4f(AXES),
-            },
+            "light": {"type": "envmap", "bitmap": around, "to_world": mi.ScalarTransform4f(AXES)},
         }
     )
 
@@ -93,11 +90,8 @@ def main() -> None:
     asset, light = read_asset(args.run / "trained/mesh.glb"), read_environment(args.run / "trained/environment.exr")
     material, photos = asset.materials[0], load_dataset(args.data)
     surface = material.roughness_metallic_texture
-    maps = {
-        "base_color": material.albedo_texture,
-        "roughness": surface[..., :1].clip(LEAST, MOST),
-        "metallic": surface[..., 1:],
-    }
+    maps = {"base_color": material.albedo_texture, "metallic": surface[..., 1:]}
+    maps["roughness"] = surface[..., :1].clip(LEAST, MOST)
     scene = scene_of(mi, asset, maps, light)
     parameters = mi.traverse(scene)
     names = [name for name in parameters.keys() if name.endswith((*(f"{k}.data" for k in maps), "light.data"))]

@@ -100,7 +100,6 @@ def beside(root: Path, uri: str) -> Path:
     (folder / "inside.bin").symlink_to("sub/the data.bin")
     os.mkfifo(folder / "pipe.bin")
     uri = uri.format(root=root, inline=base64.b64encode(asset.binary).decode())
-    (folder / "a.gltf").write_text(
-        json.dumps(asset.json | {"buffers": [{"byteLength": len(asset.binary), "uri": uri}]})
-    )
+    asset.json["buffers"] = [{"byteLength": len(asset.binary), "uri": uri}]
+    (folder / "a.gltf").write_text(json.dumps(asset.json))
     return folder / "a.gltf"

@@ -239,10 +239,7 @@ def poisoned(tensor: torch.Tensor) -> torch.Tensor:
 
 ALLOWED = {
     "the most rays": put(n_rays=8192),
-    "more rays at first than later": lambda c: (
-        put(n_rays=20000)(c),
-        put("config", "constants", initial_rays=20000)(c),
-    ),
+    "more rays first than later": lambda c: (put(n_rays=20000)(c), put("config", "constants", initial_rays=20000)(c)),
     "parameters whose sum is too large": parameter("light.texels", lambda x: x.fill_(3e38)),
     "the largest progress": put(meshed_at=1.0, previewed_at=1.0, seconds=0.0, step=0),
     "no mean of quality yet": put(psnr_mean=None),
@@ -365,9 +362,8 @@ def test_a_checkpoint_that_does_not_fit_is_refused(data, content, tmp_path, case
     change(content)
     torch.save(content, tmp_path / "checkpoint.pt")
     before = torch.get_rng_state()
-    with pytest.raises(
-        InputError, match="checkpoint.pt: its .* (does not fit the settings|cannot be restored)"
-    ) as caught:
+    said = "checkpoint.pt: its .* (does not fit the settings|cannot be restored)"
+    with pytest.raises(InputError, match=said) as caught:
         train_scene(load_dataset(data), tiny(steps=4, **settings), tmp_path, resume=True)
     assert len(str(caught.value).splitlines()) == 1
     torch.set_rng_state(before)

@@ -96,9 +96,8 @@ def test_short_names_are_those_that_one_group_alone_has():
 
 
 def test_settings_change_by_name_by_short_one_and_by_group():
-    changed = Config().replace(
-        {"light_resolution": 64, "losses.eikonal_weight": 2.0, "export": {"faces": 7, "resolution": 9}}
-    )
+    new = {"light_resolution": 64, "losses.eikonal_weight": 2.0, "export": {"faces": 7, "resolution": 9}}
+    changed = Config().replace(new)
     expected = {"light.resolution": 64, "losses.eikonal_weight": 2.0, "export.faces": 7, "export.resolution": 9}
     check_same(values(changed), values(Config()) | expected)
     assert Config().light.resolution == 128

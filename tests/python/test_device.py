@@ -115,9 +115,8 @@ def test_a_gpu_shades_a_million_emitters_at_a_time(monkeypatch):
     """Where each part costs the host its launches; the CPU takes parts that stay in its caches, see test_visibility.py."""
     parts, shade = [], model.split_sum_shade
     monkeypatch.setattr(model, "SHADED_CHUNK", model.SHADED_CHUNK | {"cpu": 50})
-    monkeypatch.setattr(
-        model, "split_sum_shade", lambda *args, **named: parts.append(len(args[0])) or shade(*args, **named)
-    )
+    noting = lambda *args, **named: parts.append(len(args[0])) or shade(*args, **named)
+    monkeypatch.setattr(model, "split_sum_shade", noting)
     torch.manual_seed(0)
     with pretend_gpu(monkeypatch):
         scene = SceneModel(tiny(open_below=0.0)).to("cuda")
@@ -139,10 +138,9 @@ def test_padding_is_computed_only_where_it_saves_a_wait(data, tmp_path, monkeypa
         return differentiate(taken, batch, found, light, step, progress, capacity)
 
     monkeypatch.setattr(GpuStep, "differentiate", watched)
+    config = tiny(name, steps=12, target_samples=4608, min_step=0.03)
     with pretend_gpu(monkeypatch):
-        train_scene(
-            load_dataset(data), tiny(name, steps=12, target_samples=4608, min_step=0.03), tmp_path, device="cuda"
-        )
+        train_scene(load_dataset(data), config, tmp_path, device="cuda")
     assert asked[0] == (False, False, True) and set(asked[4:]) == {(pads, pads, not pads)}
 
 
@@ -161,12 +159,8 @@ def test_segments_grow_where_sizes_never_repeat(data, tmp_path, monkeypatch, nam
     assert asked == ["expandable_segments:True"] * (name == "paper" and device == "cuda" and own is None)
 
 
-@pytest.mark.parametrize(
-    ("device", "processors", "threads"), [("cuda", 6, 4), ("cuda", 16, 8), ("cuda", 1, 1), ("cpu", 6, 8)]
-)
-def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
-    data, tmp_path, monkeypatch, device, processors, threads
-):
+@pytest.mark.parametrize("device, cores, threads", [("cuda", 6, 4), ("cuda", 16, 8), ("cuda", 1, 1), ("cpu", 6, 8)])
+def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(data, tmp_path, monkeypatch, device, cores, threads):
     """By all threads that work beside it, and until the last step is made."""
     seen, advance = set(), trainer.Training.advance
 
@@ -175,7 +169,7 @@ def test_two_processors_are_left_to_the_thread_that_feeds_a_gpu(
         advance(training, bar)
 
     monkeypatch.setattr(trainer.Training, "advance", watched)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(processors))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(cores))
 
     def left() -> int:
         """The threads after a training."""

@@ -125,11 +125,9 @@ def build(tmp_path):
     python.chmod(0o755)
 
     def run(inside: str = "", **settings: str) -> tuple[subprocess.CompletedProcess, list[str]]:
-        environment = (
-            os.environ | {"TORCH_PYTHON": sys.executable, "TMPDIR": str(tmp_path), "INSIDE": inside} | settings
-        )
+        own = os.environ | {"TORCH_PYTHON": sys.executable, "TMPDIR": str(tmp_path), "INSIDE": inside} | settings
         command = ["sh", str(THIRD_PARTY / "build_wheels.sh"), str(tmp_path / "out"), str(python)]
-        done = subprocess.run(command, check=False, env=environment, capture_output=True, text=True)
+        done = subprocess.run(command, check=False, env=own, capture_output=True, text=True)
         return done, log.read_text().splitlines()
 
     return run

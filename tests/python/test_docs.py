@@ -27,9 +27,7 @@ from tiny_runs import SMALL, as_options, train
 COMMANDS = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)).choices
 PAGES_WITH_CODE = [page for page in PAGES if not all(block.language.startswith("{") for block in blocks_of(page))]
 SPHINX = ("sphinx", "myst_parser", "furo", "sphinxarg", "sphinx_copybutton", "sphinx-mathjax-offline")
-INNER = set(
-    "TableCopy refuse_rounded_gradients rounded mirror_images quarter sparse_map".split()
-)  # of the trainer alone
+INNER = set("TableCopy refuse_rounded_gradients rounded mirror_images quarter sparse_map".split())  # the trainer's own
 
 # What is put behind a command's own options: the last one counts.
 SHORTER = {

@@ -248,10 +248,8 @@ class TestChoice:
 
     def test_a_gpu_that_passes_is_taken(self, gpu):
         gpu()
-        assert fit_device(failing_operators) == (
-            "cuda",
-            f"the Big GPU passes the test of {len(self_test.operators('cuda'))} operators",
-        )
+        why = f"the Big GPU passes the test of {len(self_test.operators('cuda'))} operators"
+        assert fit_device(failing_operators) == ("cuda", why)
         assert fit_device(None) == ("cuda", "the build has kernels for the Big GPU")
 
     @pytest.mark.parametrize(

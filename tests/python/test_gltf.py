@@ -124,7 +124,7 @@ def test_materials_textures_and_colour_spaces(path):
     levels = np.random.default_rng(0).integers(0, 256, (4, 2, 3)) / 255
     slot = {"index": gltf.texture(levels)}
     factors = {"baseColorFactor": [0.123456789, 0.5, 0.7, 0.3], "roughnessFactor": 0.345678901, "metallicFactor": 0.25}
-    textured = gltf.material(
+    paint = gltf.material(
         name="painted",
         emissiveFactor=[0.25, 0.5, 1.0],
         emissiveTexture=slot,
@@ -136,9 +136,7 @@ def test_materials_textures_and_colour_spaces(path):
     normal = {"NORMAL": [[0, 0, 1]] * 3}
     parts = [
         gltf.primitive(material=plain, **normal),
-        gltf.primitive(
-            TRIANGLE + 1, material=textured, TEXCOORD_0=TRIANGLE_UV, COLOR_0=[[0.5, 0.25, 1e-4]] * 3, **normal
-        ),
+        gltf.primitive(TRIANGLE + 1, material=paint, TEXCOORD_0=TRIANGLE_UV, COLOR_0=[[0.5, 0.25, 1e-4]] * 3, **normal),
         gltf.primitive(TRIANGLE + 2, material=plain, **normal),
     ]
     gltf.node(mesh=gltf.mesh(*parts))

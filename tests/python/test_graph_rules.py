@@ -50,11 +50,9 @@ class Fake(GpuStep):
 
     def find(self, batch: Rays, progress: float, capacity: int) -> Found:
         assert capacity in (0, PADDED)
-        self.given = (
-            batch,
-            Found(torch.full((capacity or self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)])),
-        )
-        return self.given[1]
+        found = Found(torch.full((capacity or self.n_found, 3), self.scale), torch.tensor([int(7 * self.scale)]))
+        self.given = batch, found
+        return found
 
     def differentiate(self, batch, found, light, step, progress, capacity):
         self.calls.append(capacity)

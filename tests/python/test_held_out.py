@@ -158,13 +158,11 @@ def test_a_stage_goes_on_with_its_best(painted):
     while not stage.finished:
         stage.advance()
     again = Stage(data, asset, sky(), SETTINGS, stage.state())
-    assert (
-        again.best[:2] == stage.best[:2] and again.last[:2] == stage.last[:2] and again.held_start == stage.held_start
-    )
+    assert again.best[:2] == stage.best[:2] and again.last[:2] == stage.last[:2]
+    assert again.held_start == stage.held_start
     assert torch.equal(again.best.unknowns, stage.best.unknowns)
-    for ours, theirs in zip(
-        again.result().asset.materials[0].__dict__.values(), stage.result().asset.materials[0].__dict__.values()
-    ):
+    materials = (vars(of.result().asset.materials[0]) for of in (again, stage))
+    for ours, theirs in zip(*(values.values() for values in materials)):
         assert np.array_equal(ours, theirs)
     with pytest.raises(KeyError, match="last"):
         Stage(data, asset, sky(), SETTINGS, {key: value for key, value in stage.state().items() if key != "last"})

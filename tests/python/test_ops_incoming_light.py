@@ -200,10 +200,8 @@ def test_the_environment_is_seen_past_the_roof_alone():
 @pytest.mark.parametrize("lamp", [False, True])
 @pytest.mark.parametrize("roughness, metallic", [(0.05, 1.0), (0.5, 0.3), (1.0, 0.0)])
 def test_densities_add_up_to_the_hemisphere(roughness, metallic, lamp):
-    points = flat_points(2000, 0.4) | {
-        "roughness": torch.full((2000, 1), roughness),
-        "metallic": torch.full((2000, 1), metallic),
-    }
+    gloss = {"roughness": torch.full((2000, 1), roughness), "metallic": torch.full((2000, 1), metallic)}
+    points = flat_points(2000, 0.4) | gloss
     sky = torch.from_numpy(sky_with_a_lamp()) if lamp else WHITE
     light = incoming_light(plain_surface(grid_mesh(2.0, 1)), sky, **points, n_directions=16, seed=2)
     torch.testing.assert_close(light.directions.norm(dim=-1), torch.ones(2000, 16), rtol=0, atol=1e-6)

@@ -6,21 +6,12 @@ import pytest
 import torch
 from op_cases import EVERY, LIGHT_NODES, floor_under_a_ball, lookup_inputs, octahedral_directions
 from op_checks import arguments_of, check_error, generator, lib, on_threads, unit
-from splitnerf import _core
+from splitnerf import _core, ops
 from splitnerf.ops import fibonacci_directions, occlusion_factors
-from splitnerf.ops.light import (
-    SparseRows,
-    light_averages,
-    light_filters,
-    light_lookup,
-    sample_ggx_lobe,
-    sh_projection,
-    sparse_product,
-    zonal_factors,
-)
+from splitnerf.ops.light import light_averages, light_filters, light_lookup, sparse_product, zonal_factors
 
 
-def dense(matrix: SparseRows) -> torch.Tensor:
+def dense(matrix: ops.light.SparseRows) -> torch.Tensor:
     """The whole matrix, image by image."""
     row = torch.repeat_interleave(torch.arange(len(matrix.places)), matrix.offsets.diff())
     out = torch.zeros(matrix.places.numel(), len(matrix.images), dtype=matrix.weights.dtype)
@@ -110,7 +101,7 @@ def test_zonal_factors_of_the_cosine_lobe_and_of_all_lobes():
 
 
 def test_the_projection_is_orthonormal_on_the_first_degrees():
-    projection = sh_projection(32, cells=False).double()
+    projection = ops.light.sh_projection(32, cells=False).double()
     w = octahedral_directions(32)
     x, y, z = w.unbind(1)
     basis = [v * math.sqrt(k / (4 * math.pi)) for v, k in ((torch.ones_like(x), 1), (y, 3), (z, 3), (x, 3))]
@@ -118,7 +109,7 @@ def test_the_projection_is_orthonormal_on_the_first_degrees():
     torch.testing.assert_close(got, torch.eye(4, dtype=torch.float64), rtol=0, atol=5e-3)
     for n in (8, 16, 32):
         for cells in (False, True):
-            totals = sh_projection(n, cells).double().sum(1)
+            totals = ops.light.sh_projection(n, cells).double().sum(1)
             assert totals[0].item() == pytest.approx(math.sqrt(4 * math.pi), rel=1e-6)
             assert totals[1:].abs().max() < 2e-6
 
@@ -137,7 +128,7 @@ def test_fibonacci_directions_are_uniform_and_seeded():
 
 def test_the_seed_decides_the_samples_of_a_lobe():
     axes, roughness = torch.tensor([[0.0, 0.0, 1.0]]), torch.tensor([[0.5]])
-    first, again, other = (sample_ggx_lobe(axes, roughness, 8, seed) for seed in (1, 1, 2))
+    first, again, other = (ops.light.sample_ggx_lobe(axes, roughness, 8, seed) for seed in (1, 1, 2))
     assert torch.equal(first, again) and not torch.equal(first, other)
 
 

@@ -12,21 +12,10 @@ from splitnerf.data.environment import directions_of_texels
 from splitnerf.data.images import linear_to_srgb, srgb_to_linear, write_image
 from splitnerf.export.bake import rasterise
 from splitnerf.ops import MeshScene
-from splitnerf.refinement import outline
+from splitnerf.refinement import lamps, outline
 from splitnerf.refinement.contours import Mesh, coverage_slopes, edges_of, outline_pieces, projected
 from splitnerf.refinement.fit import FitSettings
-from splitnerf.refinement.lamps import (
-    CompactLamp,
-    Points,
-    brightest_lobe,
-    compact_lamp,
-    degrees_from,
-    disc,
-    parts_of_light,
-    power_of,
-    unit,
-    with_lamp,
-)
+from splitnerf.refinement.lamps import CompactLamp, brightest_lobe, compact_lamp, degrees_from, power_of, unit
 from splitnerf.refinement.outline import by_colours, fit_outline, outline_pixels, slopes, weld
 from splitnerf.refinement.pixels import PixelFilter, covered_pixels
 from splitnerf.refinement.stage import Stage
@@ -201,10 +190,8 @@ def test_an_outline_is_where_colours_before_a_known_background_say(ball, painted
     )
     masks = np.array(photos(small, sky(), n=len(true), spp=16).images)[..., 3:]
     data = replace(true, images=np.concatenate([whole, masks], -1), behind_paths=[tmp_path / "behind.png"] * len(true))
-    size = [
-        np.linalg.norm(fit_outline(replace(data, whole=told), small)[0].vertices, axis=1).mean()
-        for told in (True, False)
-    ]
+    found = [fit_outline(replace(data, whole=told), small)[0] for told in (True, False)]
+    size = [np.linalg.norm(asset.vertices, axis=1).mean() for asset in found]
     assert size == pytest.approx([0.98, 0.96], abs=0.006)  # masks count, too
 
 
@@ -260,11 +247,11 @@ def shaded_albedo(asset, radius: float, light: np.ndarray, texture: float = 0.3)
     covered = rasterise(asset.uv, asset.triangles, plain.size)
     normals = unit(covered.interpolate(asset.normals, asset.triangles))
     origins = covered.interpolate(asset.vertices, asset.triangles) + 5e-3 * normals
-    points = Points(MeshScene(asset.vertices, asset.triangles), origins, normals, normals, np.zeros(len(origins)))
+    points = lamps.Points(MeshScene(asset.vertices, asset.triangles), origins, normals, normals, np.zeros(len(origins)))
     arriving = lambda directions, powers: points.cosines(directions) @ powers.mean(axis=1)
-    believed = arriving(*parts_of_light(light, 512))
-    lamp = arriving(disc(SUN, radius, 64), np.broadcast_to(POWER / 64, (64, 3)))
-    true = arriving(*parts_of_light(np.full((8, 16, 3), 0.3, np.float32), 512)) + lamp
+    believed = arriving(*lamps.parts_of_light(light, 512))
+    lamp = arriving(lamps.disc(SUN, radius, 64), np.broadcast_to(POWER / 64, (64, 3)))
+    true = arriving(*lamps.parts_of_light(np.full((8, 16, 3), 0.3, np.float32), 512)) + lamp
     own = 0.4 * np.exp(texture * np.random.default_rng(1).standard_normal(len(origins)))
     image = plain.spread(torch.from_numpy((own * true / np.maximum(believed, 1e-3)).astype(np.float32))[:, None])
     return np.repeat(image.numpy(), 3, axis=2).clip(0.01, 1)
@@ -340,12 +327,12 @@ def test_light_beside_a_warm_lamp_becomes_as_blue_as_all_light_was_grey():
     grey = (lobe.radiance + 0.3 * np.float32([0.9, 1.0, 1.1])).astype(np.float32)
     colour = lambda light: (light * areas[..., None]).sum((0, 1)) / power_of(light)
     for mirrored in (True, False):
-        new = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 1.8, 0), mirrored=mirrored)
+        new = lamps.with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 1.8, 0), mirrored=mirrored)
         np.testing.assert_allclose(colour(new), colour(grey), rtol=1e-3)
         gain = 1.0 if not mirrored else 1 + 0.8 * lobe.power.mean() / power_of(grey)
         assert power_of(new) == pytest.approx(gain * power_of(grey), rel=1e-3)
         assert new[0, 0, 2] / new[0, 0, 0] > 1.1 * grey[0, 0, 2] / grey[0, 0, 0]
-    strong = with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 40.0, 0), mirrored=True)
+    strong = lamps.with_lamp(grey, lobe, CompactLamp(SUN.tolist(), 3.0, 40.0, 0), mirrored=True)
     assert (strong > 0).all()  # however strong the lamp
 
 
@@ -382,13 +369,11 @@ def test_where_the_albedo_shows_no_compact_lamp_the_light_stays(ball_over_plate,
 def test_shadows_on_metal_and_in_a_light_without_a_lamp_say_nothing(ball_over_plate):
     light, flat = glowing_sky(12.0), np.full((16, 32, 3), 0.7, np.float32)
     albedo = shaded_albedo(ball_over_plate, 0.3, light)
-    metal = with_textures(
-        ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=POLISH + np.float32([0, 1])
-    )
+    polish = POLISH + np.float32([0, 1])
+    metal = with_textures(ball_over_plate, albedo_texture=albedo, roughness_metallic_texture=polish)
     assert compact_lamp(AssetTexels(metal), light, 3, 0)[1] is None
-    mirrored = compact_lamp(AssetTexels(metal), glowing_sky(6.0), 3, 0)[
-        1
-    ]  # its middle is known, and what is usual must do
+    # its middle is known, and what is usual must do
+    _, mirrored = compact_lamp(AssetTexels(metal), glowing_sky(6.0), 3, 0)
     assert degrees_from(np.array(mirrored.direction), SUN) < 0.3 and mirrored.pairs == 0
     assert compact_lamp(AssetTexels(ball_over_plate), flat, 3, 0) == (flat, None)
 

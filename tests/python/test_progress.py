@@ -130,9 +130,8 @@ def test_a_full_disk_ends_the_curves_and_not_the_run(data, tmp_path, monkeypatch
 def test_without_the_package_one_line_says_what_to_install(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     assert train(data, tmp_path / "run", "--tensorboard", str(tmp_path / "board")) == BAD_INPUT
-    assert (
-        capsys.readouterr().err == "splitnerf: --tensorboard: needs tensorboard; pip install 'splitnerf[tensorboard]'\n"
-    )
+    said = "splitnerf: --tensorboard: needs tensorboard; pip install 'splitnerf[tensorboard]'\n"
+    assert capsys.readouterr().err == said
     assert not (tmp_path / "run").exists() and not (tmp_path / "board").exists()
 
 

@@ -64,9 +64,8 @@ def random_scene(seed: int, folder: Path) -> Drawn:
         parts = [pick(PARTS) for _ in range(draw.integers(1, 5))]
         meshes = [PARTS[part](draw).apply_translation(draw.uniform(-0.5, 0.5, 3)) for part in parts]
         mesh = trimesh.util.concatenate(meshes)
-        look = Material(
-            "any", tuple(pick((0.0, 0.5, 1.0)) * draw.random(3)), pick((0.0, 0.1, 0.6, 1.0)), pick((0.0, 0.5, 1.0))
-        )
+        colour = tuple(pick((0.0, 0.5, 1.0)) * draw.random(3))
+        look = Material("any", colour, pick((0.0, 0.1, 0.6, 1.0)), pick((0.0, 0.5, 1.0)))
         vertices, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
         normals = np.asarray(mesh.vertex_normals, np.float32)
         asset = Asset("drawn", vertices, faces, normals, np.zeros(len(faces), np.int32), [look])

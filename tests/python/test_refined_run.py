@@ -161,11 +161,9 @@ def test_a_run_that_was_interrupted_in_its_refinement_ends_with_the_bits_of_anot
 
 
 @pytest.mark.parametrize("minutes", [0.0, 2.0])
-@pytest.mark.parametrize(
-    "place", ["refinement.refine.write_environment", "pipeline.score_run", "pipeline.forget_state"]
-)
+@pytest.mark.parametrize("part", ["refinement.refine.write_environment", "pipeline.score_run", "pipeline.forget_state"])
 def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_another(
-    run, data, tmp_path, monkeypatch, place, minutes
+    run, data, tmp_path, monkeypatch, part, minutes
 ):
     """With a state of the refinement and without."""
     killed, minutes = tmp_path / "run", ("--set", f"checkpoint_minutes={minutes}")
@@ -174,7 +172,7 @@ def test_a_run_that_was_killed_while_it_wrote_its_results_ends_with_the_bits_of_
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"splitnerf.{place}", fails)
+        patch.setattr(f"splitnerf.{part}", fails)
         assert train(data, killed, "--steps", "25", "--deterministic", *REFINED, *minutes) == FAILED
     assert (killed / "mesh.glb").exists()
     assert main(["train", str(data), "--out", str(killed), "--resume"]) == DONE

@@ -53,15 +53,10 @@ def test_points_read_what_the_path_tracer_reads(ball):
         normal_texture=(tilted / np.linalg.norm(tilted, axis=2, keepdims=True)).astype(np.float32),
     )
     pose, n = looking(0.3, 0.4), 16
-    many = AssetRenderer(asset).render(
-        sky(), pose, (FOCAL, FOCAL, n / 2, n / 2), n, n, spp=1024, pixel_filter="box", bounces=0
-    )
-    data = replace(
-        photos(ball, sky(), 1, 1),
-        poses=pose[None],
-        intrinsics=np.float32([[FOCAL, FOCAL, n / 2, n / 2]]),
-        images=np.ones((1, n, n, 4), np.float32),
-    )
+    lens = (FOCAL, FOCAL, n / 2, n / 2)
+    many = AssetRenderer(asset).render(sky(), pose, lens, n, n, spp=1024, pixel_filter="box", bounces=0)
+    view = {"poses": pose[None], "intrinsics": np.float32([lens]), "images": np.ones((1, n, n, 4), np.float32)}
+    data = replace(photos(ball, sky(), 1, 1), **view)
     pixels, texels = covered_pixels(data), AssetTexels(asset)
     inside = np.flatnonzero(many["alpha"].reshape(-1) == 1)
     offsets = np.stack(np.meshgrid(*[(np.arange(32) + 0.5) / 32 - 0.5] * 2), axis=-1).reshape(1, -1, 2)
@@ -140,9 +135,8 @@ def test_the_level_of_the_light_is_set_before_the_fit(painted):
     asset, data = painted
     gloss = np.tile(np.float32([0.3, 1.0]), (SIZE, SIZE, 1))
     dark_metal = np.full((SIZE, SIZE, 3), 0.04 * 1.9, np.float32)
-    fit = Refinement(
-        data, with_textures(asset, albedo_texture=dark_metal, roughness_metallic_texture=gloss), sky(), FitSettings()
-    )
+    asset = with_textures(asset, albedo_texture=dark_metal, roughness_metallic_texture=gloss)
+    fit = Refinement(data, asset, sky(), FitSettings())
     fit.begin_at(level_of_light(fit.texels.start))
     assert fit.level == pytest.approx(1.9, rel=1e-4)
     torch.testing.assert_close(fit.light.radiance(), 1.9 * torch.from_numpy(sky()), rtol=1e-3, atol=1e-4)

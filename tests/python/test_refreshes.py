@@ -277,13 +277,11 @@ def test_occlusion_is_traced_only_where_an_mlp_learns_it(data, tmp_path, setting
     assert not any("loss_occlusion" in line for line in lines_of(tmp_path))
 
 
-@pytest.mark.parametrize(("occlusion", "asked"), [("bits", [0.5, 1.0]), ("mlp", [0.5]), ("off", [])])
-def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, occlusion, asked):
+@pytest.mark.parametrize(("kind", "asked"), [("bits", [0.5, 1.0]), ("mlp", [0.5]), ("off", [])])
+def test_meshes_are_asked_for_where_they_are_used(data, tmp_path, monkeypatch, kind, asked):
     """The last one is for the bits: they are stored with it."""
     requests = calls(monkeypatch, meshes.SurfaceMesh, "request", lambda _, progress: progress)
-    config = tiny(
-        steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": occlusion, "shading.method": "split"}
-    )
+    config = tiny(steps=6, mesh_every=0.5, preview_every=2.0, **{"occlusion.kind": kind, "shading.method": "split"})
     train_scene(load_dataset(data), config, tmp_path)
     assert requests == asked
 

@@ -53,9 +53,8 @@ def test_gradients_of_a_picture_are_its_derivatives():
                 p.add_(shift * along)
                 sides.append(loss().item())
                 p.sub_(shift * along)
-        assert (p.grad * along).sum().item() == pytest.approx((sides[0] - sides[1]) / (2 * eps), rel=1e-4, abs=1e-5), (
-            name
-        )
+        slope = (sides[0] - sides[1]) / (2 * eps)
+        assert (p.grad * along).sum().item() == pytest.approx(slope, rel=1e-4, abs=1e-5), name
 
 
 @pytest.mark.parametrize(("variance", "share"), [(0.3, 1.0), (0.5, 0.3)])
@@ -152,10 +151,8 @@ def test_values_of_shaded_samples_are_those_of_their_places():
     torch.testing.assert_close(ray.points.normals, unit(field.gradient))
     rays = found.packed.ray_indices[ray.shaded]
     torch.testing.assert_close(torch.zeros(20).index_add(0, rays, ray.shares), ray.opacity)
-    colours = torch.zeros(20, 3).index_add(0, rays, ray.shares[:, None] * ray.points.radiance) / ray.opacity[
-        :, None
-    ].clamp(min=1e-4)
-    torch.testing.assert_close(ray.mean, colours, rtol=1e-4, atol=1e-4)
+    colours = torch.zeros(20, 3).index_add(0, rays, ray.shares[:, None] * ray.points.radiance)
+    torch.testing.assert_close(ray.mean, colours / ray.opacity[:, None].clamp(min=1e-4), rtol=1e-4, atol=1e-4)
     other = rendered(model, found._replace(phase=(found.phase + 0.5) % 1.0), shades_per_ray=2)
     assert not torch.equal(ray.shaded, other.shaded)
     fixed = rendered(model, found, shades_per_ray=2, capacity=(200, 60))
@@ -198,10 +195,9 @@ def test_walls_behind_each_other_are_segments_of_their_own(monkeypatch, capacity
     assert n_rays == n - 1 and n_segments == 2 * (n - 1) < m and ray.opacity[0] > 0.8
     *_, segments = occlusion.asked
     x = ray.positions[:, 0]
-    torch.testing.assert_close(
-        x[segments.representatives[:n_segments]].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05
-    )
-    assert torch.equal(x[segments.representatives][segments.segment][:m].sign(), x[:m].sign())
+    leading = x[segments.representatives]
+    torch.testing.assert_close(leading[:n_segments].abs(), torch.full((n_segments,), 0.5), rtol=0, atol=0.05)
+    assert torch.equal(leading[segments.segment][:m].sign(), x[:m].sign())
     candidates, number = asked[0][3:]
     assert (number is None) == (capacity is None) and (number is None or number == n_rays)
     torch.testing.assert_close(x[candidates[:n_rays]], torch.full((n_rays,), 0.5), rtol=0, atol=0.05)
@@ -218,9 +214,7 @@ def test_a_view_is_made_of_the_rays_of_its_pixels(monkeypatch):
         assert torch.equal(maps[name], parts[name]) and maps[name].shape[:2] == (height, width), name
     fx, fy, cx, cy = lens.tolist()
     row, column = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    local = torch.stack([(column + 0.5 - cx) / fx, -(row + 0.5 - cy) / fy, -torch.ones(height, width)], -1).reshape(
-        -1, 3
-    )
+    local = torch.stack([(column + 0.5 - cx) / fx, -(row + 0.5 - cy) / fy, -torch.ones(height, width)], -1).view(-1, 3)
     n = height * width
     rays = POSE[:3, 3].expand(n, 3), unit(local @ POSE[:3, :3].T), torch.full((n,), 0.5)
     ray = rendered(model, find_samples(model, cells, *rays))

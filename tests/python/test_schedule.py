@@ -10,17 +10,10 @@ from splitnerf.config import Config, preset
 from splitnerf.data.dataset import load_dataset
 from splitnerf.render.model import SceneModel
 from splitnerf.training import loop as trainer
-from splitnerf.training import losses
+from splitnerf.training import losses, schedule
 from splitnerf.training import step as step_module
 from splitnerf.training.meshes import SurfaceMesh
-from splitnerf.training.schedule import (
-    cosine_anneal,
-    light_moves,
-    light_period,
-    make_optimiser,
-    next_ray_count,
-    set_learning_rate,
-)
+from splitnerf.training.schedule import cosine_anneal, light_moves, light_period, next_ray_count, set_learning_rate
 from test_refreshes import calls
 from tiny_runs import tiny, train_scene
 
@@ -63,7 +56,7 @@ def test_each_part_has_its_rate_and_its_decay(light, sparse):
     """The sharpness and the light's texels have rates of their own and no decay, all else the common ones; none is left out."""
     settings = {"light.kind": light, "shading.method": "split", "sparse_steps": sparse}
     model = SceneModel(tiny(**settings))
-    optimiser = make_optimiser(model, tiny(**settings))
+    optimiser = schedule.make_optimiser(model, tiny(**settings))
     rates, decays, sparsely = {}, {}, {}
     for group in optimiser.param_groups:
         for parameter in group["params"]:
@@ -182,9 +175,8 @@ def test_a_run_follows_its_schedules(data, tmp_path, monkeypatch):
     config = tiny(steps=n, warmup_steps=8, final_learning_rate=0.1, **levels, **begun_late, **of_light)
     levels = recorded(monkeypatch, "find_samples", lambda args, _, __: args[0].sdf_field.grid.n_active, step_module)
     anneals = recorded(monkeypatch, "find_samples", lambda args, *_: args[5], step_module)
-    rates = recorded(
-        monkeypatch, "set_learning_rate", lambda args, *_: [g["lr"] / g["rate"] for g in args[0].param_groups]
-    )
+    by_group = lambda args, *_: [group["lr"] / group["rate"] for group in args[0].param_groups]
+    rates = recorded(monkeypatch, "set_learning_rate", by_group)
     terms = recorded(monkeypatch, "loss_terms", lambda _, __, result: {k: t.weight for k, t in result.items()}, losses)
     requested = calls(monkeypatch, SurfaceMesh, "request", lambda _, progress: progress)
     train_scene(load_dataset(data), config, tmp_path)

@@ -123,10 +123,8 @@ def test_it_starts_as_the_distance_to_a_sphere():
         assert outputs[1:].std().item() == pytest.approx(math.sqrt(1 / k), rel=0.05)
         assert 1e-5 < outputs[0].std() < 1e-3 and not field.out_bias[1:].any() and not field.hidden_bias.any()
         assert field.hidden_direction[:, :3].std().item() == pytest.approx(math.sqrt(2 / k), rel=0.05)
-        for direction, length in (
-            (field.hidden_direction, field.hidden_length),
-            (field.out_direction, field.out_length),
-        ):
+        for part in ("hidden", "out"):
+            direction, length = (getattr(field, f"{part}_{name}") for name in ("direction", "length"))
             torch.testing.assert_close(length, direction.norm(dim=1, keepdim=True))
 
 

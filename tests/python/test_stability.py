@@ -168,9 +168,7 @@ def test_nan_gives_nan(name):
 def test_a_grazing_light_of_denormal_cosine_has_finite_gradients():
     normals = torch.tensor([[0.0, 0.0, 1.0]], requires_grad=True)
     roughness = torch.tensor([[0.3]], requires_grad=True)
-    light_dirs, view_dirs = torch.tensor([[[1.0, 0.0, 1e-45]]]), torch.tensor([[-0.6, 0.0, 0.8]])
-    sums = ops.shading.monte_carlo_light(
-        normals, view_dirs, roughness, light_dirs, torch.ones(1, 1), torch.ones(1, 1, 3)
-    )
+    light_dirs, views = torch.tensor([[[1.0, 0.0, 1e-45]]]), torch.tensor([[-0.6, 0.0, 0.8]])
+    sums = ops.shading.monte_carlo_light(normals, views, roughness, light_dirs, torch.ones(1, 1), torch.ones(1, 1, 3))
     gradients = torch.autograd.grad(sum(x.sum() for x in sums), (normals, roughness))
     assert all(bool(torch.isfinite(x).all()) for x in gradients)

@@ -61,9 +61,8 @@ def test_summed_light_is_nearer_to_the_integral_than_the_split():
     views = unit(n + 0.9 * unit(torch.randn(200, 3, generator=g)))
     rough, metal, albedo = torch.full((200, 1), 0.6), torch.zeros(200, 1), torch.full((200, 3), 0.05)
     exact = brute_force(model.light, n, views, albedo, rough, metal).detach()
-    light = prefiltered(
-        model.light, torch.cat([light_queries(n, views, rough)[0][:200], n]), torch.cat([rough, torch.ones_like(rough)])
-    )
+    queries = torch.cat([light_queries(n, views, rough)[0][:200], n])
+    light = prefiltered(model.light, queries, torch.cat([rough, torch.ones_like(rough)]))
     one, material = torch.ones(200, 3), {"albedo": albedo, "roughness": rough, "metallic": metal}
     split = split_sum_shade(n, views, **material, specular=light[:200], diffuse=light[200:], compensate=True)
     points = ShadedPoints(split, n, albedo, rough, metal, one, one, n, 0.5 * n)
@@ -129,10 +128,8 @@ def points_at(roughness: torch.Tensor, split: float) -> tuple:
     normals = unit(torch.randn(n, 3, generator=g))
     views = unit(normals + 0.5 * unit(torch.randn(n, 3, generator=g)))
     one = torch.ones(n, 1)
-    albedo = torch.full((n, 3), 0.5)
-    return views, ShadedPoints(
-        torch.full((n, 3), split), normals, albedo, roughness, 0 * one, one, one, normals, 0.5 * normals
-    )
+    radiance, albedo = torch.full((n, 3), split), torch.full((n, 3), 0.5)
+    return views, ShadedPoints(radiance, normals, albedo, roughness, 0 * one, one, one, normals, 0.5 * normals)
 
 
 def test_the_sum_comes_in_smoothly_over_its_band():
@@ -146,9 +143,8 @@ def test_the_sum_comes_in_smoothly_over_its_band():
     for n in (None, 7, 4):
         found = []
         for split in (0.0, 1.0):
-            at, correction = model.quadrature_correction(
-                light, *points_at(roughness, split), candidates, None if n is None else torch.tensor(n)
-            )
+            number = None if n is None else torch.tensor(n)
+            at, correction = model.quadrature_correction(light, *points_at(roughness, split), candidates, number)
             found.append(torch.zeros(8, 3).index_add(0, at, correction))
             assert n is not None or (expected[at] > 0).all()  # others are left out
         share = (found[0] - found[1])[:, 0]
@@ -175,9 +171,7 @@ def test_the_sum_holds_what_the_mesh_sends():
 def test_visibility_is_asked_on_the_viewers_side():
     model = with_mesh(trimesh.creation.icosphere(2, 0.5))
     asked, visibility = [], model.bits.visibility
-    model.bits.visibility = lambda positions, normals: (
-        asked.append((positions, normals)) or visibility(positions, normals)
-    )
+    model.bits.visibility = lambda *points: asked.append(points) or visibility(*points)
     views, points = points_at(torch.full((6, 1), 0.9), 0.0)
     at = torch.tensor([4, 1, 2])
     model.quadrature_correction(model.evaluate_light(), views, points._replace(normals=-points.normals), at)
@@ -245,9 +239,8 @@ def test_a_correction_counts_by_the_share_of_its_segment():
     for k, added in zip(at.tolist(), correction):
         ray = rays[shaded[k]]
         expected[ray] += added * shares[segment == segment[k]].sum() / opacity[ray].clamp(min=MIN_OPACITY)
-    torch.testing.assert_close(
-        add_corrections(mean, correction, at, spread, rays, shares, opacity), expected, rtol=1e-12, atol=1e-12
-    )
+    found = add_corrections(mean, correction, at, spread, rays, shares, opacity)
+    torch.testing.assert_close(found, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_rays_are_weighed_by_the_cosine_they_are_told():

@@ -31,9 +31,7 @@ PHASE, NUMBERS, LOST, SAID = (
     f"document.getElementById('{name}').textContent" for name in ("phase", "numbers", "lost", "said")
 )
 LOADED = "document.getElementById('said').textContent === ''"
-COLOURS = (
-    "new Set(document.querySelector('#chart canvas').getContext('2d').getImageData(0, 0, 200, 100).data).size > 20"
-)
+DRAWN = "new Set(document.querySelector('#chart canvas').getContext('2d').getImageData(0, 0, 200, 100).data).size > 20"
 
 
 def press(selector):
@@ -84,16 +82,12 @@ def walk(data, tmp_path_factory):
                 wait(f"{PHASE}.includes('paused')"),
                 lambda: versions.append(live.shown.sources[0].version),
                 picture(run.parent / "paused.png", **RESTLESS),
-                text("curve", COLOURS, **RESTLESS),
+                text("curve", DRAWN, **RESTLESS),
                 text("button", "document.getElementById('pause').textContent", **RESTLESS),
                 {"do": "size", "width": 380, "height": 700} | RESTLESS,
                 picture(run.parent / "narrow.png", **RESTLESS),
                 text("overflow", "document.documentElement.scrollWidth - innerWidth", **RESTLESS),
-                text(
-                    "panel",
-                    "document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth",
-                    **RESTLESS,
-                ),
+                text("panel", "(e => e.scrollWidth - e.clientWidth)(document.getElementById('panel'))", **RESTLESS),
                 press("#pause"),
                 wait(f"!{PHASE}.includes('paused')"),
                 press("#stop"),
@@ -189,8 +183,7 @@ def test_an_asset_whose_connection_breaks_off_is_asked_for_again(tmp_path, monke
 
     monkeypatch.setattr(Handler, "_asset", half)
     with serving(ViewServer(ViewedAssets([folder]))) as server:
-        told = look_at(
-            server.url, [*opened(500, 400, **RESTLESS), text("said", SAID, **RESTLESS), read.set, wait(LOADED)]
-        )["texts"]
+        steps = [*opened(500, 400, **RESTLESS), text("said", SAID, **RESTLESS), read.set, wait(LOADED)]
+        told = look_at(server.url, steps)["texts"]
     assert told["said"] == "the connection broke off; what was missing is asked for again once splitnerf answers"
     assert len(asked) == 2

@@ -73,10 +73,7 @@ def seen(run):
         text("file", "(a => [a.download, a.parentElement.textContent])(document.querySelector('#panel a'))"),
         text("titles", "[...document.querySelectorAll('#panel [title]')].map((e) => e.title)"),
         {"do": "set", "selector": "[name=exposure]", "value": 3},
-        text(
-            "reset",
-            f"(e => {{ e.dispatchEvent(new Event('dblclick', {{bubbles: true}})); return e.value; }})({EXPOSURE})",
-        ),
+        text("reset", f"(e => (e.dispatchEvent(new Event('dblclick', {{bubbles: true}})), e.value))({EXPOSURE})"),
         *keys("2"),
         text("greyed", f"[{lit}.matches(':disabled'), {EXPOSURE}.matches(':disabled')]"),
         *keys(".", "b", "1"),

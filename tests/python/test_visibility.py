@@ -34,9 +34,8 @@ def test_bits_and_hits_are_those_of_single_rays():
     scene, (x, n), w = scene_of(mesh), corners(mesh), lattice(96)
     bits, hits = visibility_bits(scene, x, n, w, OFFSET, with_hits=True)
     assert bits.shape == (len(x), 2, 3) and hits.shape == (len(x), 96)
-    open_, blocked = (
-        ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool().reshape(len(x), 2, 96).unbind(1)
-    )
+    single = ((bits[..., None] >> torch.arange(32, dtype=torch.int32)) & 1).bool()
+    open_, blocked = single.reshape(len(x), 2, 96).unbind(1)
     origins = (x + OFFSET * n)[:, None].expand(-1, 96, 3)
     expected = scene.is_open(origins.reshape(-1, 3), w.repeat(len(x), 1)).view(len(x), 96)
     above = n @ w.T > 0
@@ -149,12 +148,9 @@ def test_what_is_kept_of_a_mesh_is_what_its_vertices_see(indirect):
     again = trimesh.Trimesh(vertices.numpy(), faces.numpy(), process=False)
     normals = torch.tensor(np.array(again.vertex_normals)).float()
     for towards in (lattice(256), SkyCells(256).aims(Painted().evaluate())):
-        traced = VisibilityBits.trace(
-            scene_of(mesh), vertices, faces, towards, offset=0.03, n_channels=3, indirect=indirect
-        )
-        expected = VisibilityCache.trace(
-            scene_of(mesh), vertices, normals, float(again.area), towards, offset=0.03, with_hits=True
-        )
+        scene, far = scene_of(mesh), {"offset": 0.03}
+        traced = VisibilityBits.trace(scene, vertices, faces, towards, **far, n_channels=3, indirect=indirect)
+        expected = VisibilityCache.trace(scene, vertices, normals, float(again.area), towards, **far, with_hits=True)
         assert torch.equal(traced.cache.vertices, vertices) and torch.equal(traced.cache.normals, normals)
         assert torch.equal(traced.cache.directions, towards) and traced.cache.radius == expected.radius
         assert torch.equal(traced.cache.bits, expected.bits) and (traced.emitters is not None) == indirect
