@@ -9,7 +9,8 @@ from splitnerf.cli import DONE, main
 from splitnerf.config import Config, preset
 from splitnerf.errors import InputError
 from splitnerf.evaluate.score_table import values_of
-from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, make_rows
+from splitnerf_tools.ablate import runs
+from splitnerf_tools.ablate.rows import FULL, PAPER, REFERENCES, SWITCHES, Row, make_rows
 from splitnerf_tools.ablate.scores import Score, csv_table, differences, markdown_table
 from test_train import flat
 from tiny_runs import SMALL, as_options, refused
@@ -30,6 +31,8 @@ def test_every_row_is_possible(name, n_rows):
     assert len(names) == len(rows) == n_rows
     assert all(row.reference in names and row.reference != row.name for row in rows[1:])
     assert REFERENCES.keys() <= (PAPER | SWITCHES).keys()
+    weights = {value for row in (PAPER | SWITCHES).values() for key, value in row.items() if key.endswith("_weight")}
+    assert weights == {0.0}
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -51,16 +54,13 @@ def test_a_row_brings_what_it_is_compared_with():
     assert [(row.name, row.reference) for row in split[1:]] == [("split sum, no occlusion", FULL)]
 
 
-def test_rows_that_change_nothing_are_left_out():
+def test_rows_that_change_nothing_are_left_out_and_unknown_ones_named():
     base = Config()
     rows = make_rows(base)
     assert rows[0].name == FULL and rows[0].config == base
     assert all(a.config != b.config for i, a in enumerate(rows) for b in rows[:i])
     assert len({row.slug for row in rows}) == len(rows)
     assert [r.name for r in make_rows(base.replace({"mask_weight": 0.0}), ["no mask loss"])] == [FULL]
-
-
-def test_an_unknown_row_is_named():
     with pytest.raises(InputError, match="'no such row'"):
         make_rows(Config(), ["no such row"])
 
@@ -70,9 +70,21 @@ def test_differences_are_by_seed():
     b, c = differences(scores, "scene")
     assert b.mean == pytest.approx(0.3) and b.error == pytest.approx(0.2)
     assert c.mean == pytest.approx(0.2) and c.error is None and c.verdict() == "no difference"
-    assert dataclasses.replace(c, mean=-0.4).verdict() == "-0.40 dB"
-    assert b.verdict().startswith("no difference (+0.30")
-    assert dataclasses.replace(b, error=0.1).verdict() == "+0.30 ± 0.10 dB"
+    assert dataclasses.replace(c, mean=-0.4).verdict() == "-0.40 dB" and b.verdict().startswith("no difference (+0.30")
+    assert dataclasses.replace(b, error=0.14).verdict() == "+0.30 ± 0.14 dB"
+    assert [dataclasses.replace(c, mean=mean).verdict() for mean in (-0.29, 0.3)] == ["no difference", "+0.30 dB"]
+
+
+def test_close_rows_and_what_they_are_compared_with_get_more_seeds(tmp_path, monkeypatch):
+    """Two seeds more where the first differs by less than 0.3 dB."""
+    gains = {FULL: 30.0, "far": 29.7, "base": 25.0, "near base": 24.71}
+    rows = [Row(name, Config(), "base" if name == "near base" else FULL) for name in gains]
+    monkeypatch.setattr(runs, "run_row", lambda plan, scene, row, seed: {"relight": {"psnr": gains[row.name] + seed}})
+    shown, plan = [], runs.AblationPlan([tmp_path / "a"], rows, 3, None, tmp_path)
+    scores = runs.ablate(plan, lambda so_far: shown.append(len(so_far)))
+    again = [(name, seed) for name in ("base", "near base") for seed in (1, 2)]
+    assert [(s.row, s.seed) for s in scores] == [*((name, 0) for name in gains), *again] and shown == [*range(1, 9)]
+    assert [s.values["relight"] for s in scores[-2:]] == [25.71, 26.71] and scores[-1].reference == "base"
 
 
 def test_a_row_is_compared_with_its_reference():
@@ -80,11 +92,8 @@ def test_a_row_is_compared_with_its_reference():
     b, c = differences(scores, "scene")
     assert b.mean == pytest.approx(-2.0) and c.mean == pytest.approx(1.0)
     assert "| +1.00 dB | b |" in markdown_table(scores)
-
-
-def test_without_relit_views_novel_views_judge():
     (b,) = differences([score(FULL, 0, None, 30.0), score("b", 0, None, 31.0)], "scene")
-    assert b.mean == pytest.approx(1.0)
+    assert b.mean == pytest.approx(1.0)  # without relit views, novel views judge
 
 
 def test_tables_hold_what_is_known():
@@ -117,8 +126,7 @@ def test_it_runs_and_goes_on(data, tmp_path, capsys):
     first = (runs / "full" / "checkpoint.pt").stat().st_mtime_ns
     (runs / "no_mask_loss" / "scores.json").unlink()  # as if it had been interrupted
     assert main([*command, "--rows", "no mask loss; no metal regulariser", "--seeds", "3"]) == DONE
-    assert (runs / "full" / "checkpoint.pt").stat().st_mtime_ns == first
-    assert (runs / "no_metal_regulariser").is_dir()
+    assert (runs / "full" / "checkpoint.pt").stat().st_mtime_ns == first and (runs / "no_metal_regulariser").is_dir()
     rows = list(csv.DictReader((tmp_path / "out" / "ablation.csv").read_text().splitlines()))
     assert {r["row"] for r in rows} == {FULL, "no mask loss", "no metal regulariser"}
     assert all(np.isfinite(float(r["novel_view"])) for r in rows)

@@ -5,7 +5,7 @@ Skipped where Node, Chromium or the packages of the pages' sources (`npm ci` the
 
 import numpy as np
 import pytest
-from looking_at import look_at, middle, needs_chromium, opened, pixels
+from looking_at import keys, look_at, middle, needs_chromium, opened, pixels
 from looking_at import text as say
 from painted_ball import sky, with_textures
 from splitnerf.data.images import linear_to_srgb, write_image
@@ -23,11 +23,6 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...rest) { return kind.
 pytestmark = needs_chromium
 
 
-def look(page, steps):
-    """What the page says while it does the steps."""
-    return look_at(page.as_uri(), steps)
-
-
 def plain(colour, alpha=1.0):
     maps = {"rgb": np.full((40, 60, 3), colour), "alpha": np.full((40, 60), alpha), "roughness": np.full((40, 60), 0.5)}
     return maps | {"albedo": np.full((40, 60, 3), 0.25), "normal": np.tile(np.float32([0, 0, 1]), (40, 60, 1))}
@@ -41,18 +36,14 @@ def report(ball, tmp_path_factory):
     brown = np.full((64, 64, 3), (0.6, 0.3, 0.1), np.float32)
     asset = with_textures(ball, albedo_texture=brown, roughness_metallic_texture=materials)
     write_glb(folder / "mesh.glb", asset, np.full((64, 64), 0.8, np.float32))
-    tilted = plain(BLUE)
-    tilted["normal"] = np.tile(np.float32([0.5, 0, 0.75**0.5]), (40, 60, 1))
+    tilted = plain(BLUE) | {"normal": np.tile(np.float32([0.5, 0, 0.75**0.5]), (40, 60, 1))}
     tilted["roughness"] = tilted["roughness"] + 0.25
     views = [{"name": f"r_{i}", "truth": plain(RED), "prediction": tilted} for i in range(2)]
     true = np.full((128, 256, 3), 0.5, np.float32)
     true[LAMP] = (64.0, 8.0, 1.0)
     above = np.repeat(np.linspace(3, 0, 64, dtype=np.float32), 128 * 3).reshape(64, 128, 3)
-    for file, picture in {
-        **dict.fromkeys(FILES, above),
-        "square.exr": above[:, :64],
-        "negative.exr": above - 1,
-    }.items():
+    maps = dict.fromkeys(FILES, above) | {"square.exr": above[:, :64], "negative.exr": above - 1}
+    for file, picture in maps.items():
         write_image(folder / file, picture)
     (folder / "cut.exr").write_bytes((folder / "above.exr").read_bytes()[:900])
     (folder / "notes.txt").write_text("no light")
@@ -60,9 +51,8 @@ def report(ball, tmp_path_factory):
     history = [{"step": 100 * i, "loss": 2.0**-i, "psnr": 20.0 + i} | terms[i] for i in range(9)]
     summary = {"Settings": {f"s{i}": i for i in range(30)}}
     lights = {"lights": [{"roughness": 0.0, "g": sky(32)}], "light_truth": true, "light": sky(32)}
-    times = {"history": history, "timings": {"training": 3.0}}
-    shown = {"summary": summary, "views": views, "asset": folder / "mesh.glb"}
-    write_report(folder / "report.html", title="two </script> views", **shown, **lights, **times)
+    shown = {"summary": summary, "views": views, "asset": folder / "mesh.glb", "timings": {"training": 3.0}}
+    write_report(folder / "report.html", title="two </script> views", history=history, **shown, **lights)
     return folder / "report.html"
 
 
@@ -71,9 +61,10 @@ def seen(report):
     """Pictures by name, and what the page said, of one walk through the page."""
     folder = report.parent / "pictures"
     folder.mkdir()
-
-    def part(name, selector):
-        return {"do": "part", "selector": selector, "path": str(folder / f"{name}.png")}
+    part = lambda name, selector: {"do": "part", "selector": selector, "path": str(folder / f"{name}.png")}
+    point = lambda selector, x, y, press=False: {"do": "point", "selector": selector, "place": [x, y], "press": press}
+    over = lambda chart, x: point(f"{chart} .u-over", x, 0.5)
+    text = lambda name, selector: say(name, f"document.querySelector('{selector}')?.innerText")
 
     def click(words, section):
         script = f"[...document.querySelectorAll('#{section} button')].find((b) => b.textContent === '{words}').click()"
@@ -87,12 +78,6 @@ def seen(report):
         script = f"(l => {{ l.selectedIndex = [...l.options].findIndex(o => o.text === '{name}'); {INPUT} }})({LIGHT})"
         return say(name, script)
 
-    def text(name, selector):
-        return say(name, f"document.querySelector('{selector}')?.innerText")
-
-    def point(selector, x, y, press=False):
-        return {"do": "point", "selector": selector, "place": [x, y], "press": press}
-
     def dropped(file):
         path = {"do": "drop", "path": str(report.parent / file)}
         return path, say(f"said of {file}", "document.querySelector('#object .hint + input + .hint').innerText")
@@ -104,62 +89,44 @@ def seen(report):
     asked = "performance.getEntriesByType('resource').map((e) => e.name).filter((n) => !/^(blob|data):/.test(n))"
     maps = [step for name in CHANNELS[1:] for step in (choose(name), part(name, object_))]
     chart, terms = "#training figure:nth-child(2)", "#training figure:nth-child(3)"
+    said, tip, hidden_curve = "#views .said", f"{terms} .tip", f"{terms} .u-legend .u-series:nth-child(2)"
+    exposures = (f"#{section} [name=exposure]" for section in ("light", "object"))
+    darker, brighter = ({"do": "set", "selector": one, "value": stops} for one, stops in zip(exposures, (-5, 2)))
     steps = [
-        *opened(700, 600),
-        bare,
-        say("asked", asked),
+        *(*opened(700, 600), bare, say("asked", asked)),
         say("live", "[...document.querySelectorAll('.live')].map((e) => e.id)"),
         say("static", "[...document.querySelectorAll('.static')].filter((e) => e.checkVisibility()).length"),
-        part("half", stage),
-        point(stage, 0.25, 0.5, press=True),
-        part("quarter", stage),
-        text("readout", "#views .said"),
+        *(part("half", stage), point(stage, 0.25, 0.5, press=True), part("quarter", stage), text("readout", said)),
         {"do": "focus", "selector": "#views .stage input"},
-        {"do": "key", "key": "PageUp"},
-        *[{"do": "key", "key": "ArrowLeft"}] * 2,
-        part("keys", stage),
-        click("error", "views"),
-        part("error", stage),
-        text("mean", "#views .said"),
-        text("scale", "#views .legend-row"),
-        click("normals", "views"),
-        text("angle", "#views .said"),
-        click("roughness", "views"),
-        text("rough", "#views .said"),
-        part("light", true_light),
-        {"do": "set", "selector": "#light [name=exposure]", "value": -5},
-        part("dark", true_light),
-        point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128),
-        text("radiance", "#light .said"),
-        point(f"{chart} .u-over", 0.25, 0.5),
-        text("tip", f"{chart} .tip"),
-        point(f"{chart} .u-over", 0.99, 0.5),
-        text("last", f"{chart} .tip"),
-        point(f"{terms} .u-over", 0.99, 0.5),
-        text("terms", f"{terms} .tip"),
-        point(f"{terms} .u-legend .u-series:nth-child(2)", 0.5, 0.5, press=True),
-        point(f"{terms} .u-over", 0.98, 0.5),
-        text("fewer", f"{terms} .tip"),
+        *(*keys("PageUp", "ArrowLeft", "ArrowLeft"), part("keys", stage)),
+        *(click("error", "views"), part("error", stage)),
+        *(text("mean", said), text("scale", "#views .legend-row"), click("normals", "views"), text("angle", said)),
+        *(
+            click("roughness", "views"),
+            text("rough", said),
+            part("light", true_light),
+            darker,
+            part("dark", true_light),
+        ),
+        *(point(true_light, (LAMP[1] + 0.5) / 256, (LAMP[0] + 0.5) / 128), text("radiance", "#light .said")),
+        *(
+            step
+            for x, name in ((0.25, "tip"), (0.99, "last"))
+            for step in (over(chart, x), text(name, f"{chart} .tip"))
+        ),
+        *(over(terms, 0.99), text("terms", tip), point(hidden_curve, 0.5, 0.5, press=True)),
+        *(over(terms, 0.98), text("fewer", tip)),
         say("linear", f"document.querySelector('{terms} .axis input').click()"),
-        point(f"{terms} .u-over", 0.02, 0.5),
-        text("zero", f"{terms} .tip"),
-        part("shaded", object_),
-        *maps,
-        choose("shaded"),
+        *(over(terms, 0.02), text("zero", tip), part("shaded", object_), *maps, choose("shaded")),
         *(step for name in ("true light", "sunset") for step in (light(name), part(name, object_))),
-        *dropped("negative.exr"),
-        *(step for file in FILES for step in (*dropped(file), part(file, object_))),
+        *(*dropped("negative.exr"), *(step for file in FILES for step in (*dropped(file), part(file, object_)))),
         *(step for file in ("square.exr", "cut.exr", "notes.txt") for step in dropped(file)),
-        say("chosen", f"{LIGHT}.selectedOptions[0].text"),
-        part("kept", object_),
-        light("true light"),
-        {"do": "set", "selector": "#object [name=exposure]", "value": 2},
-        part("brighter", object_),
-        {"do": "size", "width": 380, "height": 700},
+        *(say("chosen", f"{LIGHT}.selectedOptions[0].text"), part("kept", object_), light("true light"), brighter),
+        *(part("brighter", object_), {"do": "size", "width": 380, "height": 700}),
         say("unfolded", "document.querySelectorAll('details').forEach((e) => (e.open = true))"),
         say("overflow", "document.documentElement.scrollWidth - innerWidth"),
     ]
-    told = look(report, steps)
+    told = look_at(report.as_uri(), steps)
     return told, {path.stem: pixels(path) for path in folder.glob("*.png")}
 
 
@@ -169,9 +136,10 @@ def share_of(picture, colour):
 
 
 def test_the_file_loads_without_a_complaint_or_a_request(seen):
+    """And a narrow window does not scroll sideways."""
     told, _ = seen
-    assert [line for line in told["console"] if not line.startswith("warning: ")] == []
-    assert told["texts"]["asked"] == []
+    assert told["texts"]["overflow"] == 0
+    assert [line for line in told["console"] if not line.startswith("warning: ")] == [] and told["texts"]["asked"] == []
     assert told["texts"]["live"] == ["object", "views", "light", "training"] and told["texts"]["static"] == 0
 
 
@@ -210,22 +178,18 @@ def test_the_exposure_changes_the_lights_pixels(seen):
 
 def test_curves_say_the_values_under_the_pointer(seen):
     texts = seen[0]["texts"]
-    assert texts["tip"].split("\n") == ["step 200", "loss 0.25"]
-    assert texts["last"].split("\n") == ["step 800", "loss 0.003906"]
-    assert texts["terms"].split("\n") == ["step 800", "colour 1e-8", "late 0.001", "light 0.5"]
-    assert texts["fewer"].split("\n") == ["step 800", "colour 1e-8", "light 0.5"]
-    assert texts["zero"].split("\n") == ["step 0", "colour 1", "light 0.5"]
+    said = {"tip": "step 200, loss 0.25", "last": "step 800, loss 0.003906", "zero": "step 0, colour 1, light 0.5"}
+    said |= {"terms": "step 800, colour 1e-8, late 0.001, light 0.5", "fewer": "step 800, colour 1e-8, light 0.5"}
+    assert {name: ", ".join(texts[name].split("\n")) for name in said} == said
 
 
 def test_the_asset_turns_up_in_each_channel(seen):
     _, pictures = seen
     albedo = linear_to_srgb(np.float32([0.6, 0.3, 0.1]))
-    assert middle(pictures["albedo"]) == pytest.approx(albedo, abs=0.02)
-    assert middle(pictures["roughness"]) == pytest.approx([0.25] * 3, abs=0.02)
-    assert middle(pictures["metallic"]) == pytest.approx([0.0] * 3, abs=0.02)
-    assert middle(pictures["occlusion"]) == pytest.approx([0.8] * 3, abs=0.02)
     front = np.float32([0, -np.cos(np.radians(20)), np.sin(np.radians(20))]) / 2 + 0.5
-    assert middle(pictures["normals"]) == pytest.approx(front, abs=0.02)
+    channels = {"albedo": albedo, "normals": front, "roughness": 0.25, "metallic": 0.0, "occlusion": 0.8}
+    for name, value in channels.items():
+        assert middle(pictures[name]) == pytest.approx(np.broadcast_to(value, 3), abs=0.02), name
     shaded = middle(pictures["shaded"])
     assert shaded[0] > shaded[1] > shaded[2] > 0.02
     assert np.abs(pictures["true light"] - pictures["shaded"]).mean() > 0.01  # of the ball, on plain grey
@@ -248,10 +212,6 @@ def test_lights_of_the_readers_own_files_light_the_object(seen):
     assert told["texts"]["said of notes.txt"] == "notes.txt: is no .hdr or .exr file"
 
 
-def test_a_narrow_window_does_not_scroll_sideways(seen):
-    assert seen[0]["texts"]["overflow"] == 0
-
-
 def test_without_webgl_one_line_takes_the_place_of_the_object(report):
     steps = [
         {"do": "before", "script": NO_WEBGL},
@@ -259,6 +219,6 @@ def test_without_webgl_one_line_takes_the_place_of_the_object(report):
         say("said", "document.querySelector('#object').innerText"),
         say("live", "[...document.querySelectorAll('.live')].map((e) => e.id)"),
     ]
-    told = look(report, steps)
+    told = look_at(report.as_uri(), steps)
     assert told["console"] == [] and told["texts"]["live"] == ["views", "light", "training"]
     assert "no WebGL 2" in told["texts"]["said"]

@@ -1,6 +1,8 @@
 """Rendered data sets: what each layout's files hold against the renderer's arrays, and built-in shapes."""
 
 import json
+from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,12 +14,13 @@ from splitnerf.data.images import linear_to_srgb, read_image, write_image
 from splitnerf.data.truth import load_scene_truth, load_view_truths, read_relit, relight_maps
 from splitnerf.evaluate.scoring import FIRST_SEED, asset_mesh
 from splitnerf.relight.cameras import bounding_sphere
-from splitnerf.render.path_traced import AssetRenderer
+from splitnerf.render.path_traced import MOST_VIEWS, AssetRenderer
 from splitnerf_tools.commands import synth as synth_command
+from splitnerf_tools.synth import rendering
 from splitnerf_tools.synth.rendering import SynthSettings, normalised, orbit, render_views, spiral, synthesise
 from splitnerf_tools.synth.shapes import MATERIALS, SHAPES, pattern, shape_asset
 from splitnerf_tools.synth.writer import LAYOUTS, SceneWriter
-from tiny_runs import command
+from tiny_runs import command, refused
 
 SIZE = 24
 HALF_STEP = 0.5 / 255 + 1e-6
@@ -26,7 +29,7 @@ HALF_STEP = 0.5 / 255 + 1e-6
 def piece(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: float, offset: tuple) -> trimesh.Trimesh:
     """A mesh with its material, moved, z up turned to glTF's y up."""
     material = trimesh.visual.material.PBRMaterial(
-        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness
+        baseColorFactor=[*colour, 1.0], metallicFactor=metallic, roughnessFactor=roughness, emissiveFactor=[0.2, 0, 0]
     )
     vertices = (mesh.vertices + offset)[:, [0, 2, 1]] * [1, 1, -1]
     normals = np.array(mesh.vertex_normals)[:, [0, 2, 1]] * [1, 1, -1]
@@ -36,7 +39,7 @@ def piece(mesh: trimesh.Trimesh, colour: tuple, metallic: float, roughness: floa
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """An asset with no symmetry, off the origin, and two maps: one side bright, and a blue one."""
+    """An asset with no symmetry, off the origin, that glows, and two maps: one side bright, and a blue one."""
     folder = tmp_path_factory.mktemp("files")
     ball = piece(trimesh.creation.icosphere(subdivisions=4), (0.8, 0.3, 0.1), 0.0, 0.6, (5.0, 2.0, 1.0))
     small = piece(trimesh.creation.icosphere(subdivisions=3, radius=0.5), (0.9, 0.9, 0.9), 1.0, 0.4, (6.5, 2.2, 1.6))
@@ -47,18 +50,6 @@ def files(tmp_path_factory):
     write_image(folder / "sunny.exr", sunny)
     write_image(folder / "blue.exr", np.full((16, 32, 3), (0.2, 0.4, 0.9), np.float32))
     return folder
-
-
-class Recorder:
-    """A renderer that keeps what it gave."""
-
-    def __init__(self, asset):
-        self.renderer, self.maps, self.seeds = AssetRenderer(asset), [], []
-
-    def render(self, *args, **options):
-        self.seeds.append(options["seed"])
-        self.maps.append(self.renderer.render(*args, **options))
-        return self.maps[-1]
 
 
 def close_images(image, maps):
@@ -73,27 +64,31 @@ def close_images(image, maps):
 def test_files_hold_what_was_rendered(files, tmp_path, layout):
     asset = read_asset(files / "balls.glb")
     centre, radius = bounding_sphere(asset)
-    recorder, settings = Recorder(normalised(asset, centre, 1 / radius)), SynthSettings(SIZE, 3, 2, 4, layout)
+    renderer, given = AssetRenderer(normalised(asset, centre, 1 / radius)), []
+    recorder, settings = Mock(), SynthSettings(SIZE, 3, 2, 4, layout)
+    recorder.render = Mock(
+        side_effect=lambda *args, **options: given.append(renderer.render(*args, **options)) or given[-1]
+    )
     writer = SceneWriter(tmp_path, 0.6911112070083618, layout)
     light = np.full((8, 16, 3), 0.5, np.float32)
     relight = {"a": writer.light(light * 2, "a"), "b_1": writer.light(light, "b_1")}
     render_views(recorder, writer, writer.light(light), relight, settings)
-    assert len(set(recorder.seeds)) == len(recorder.seeds) == 3 + 2 * 3 and max(recorder.seeds) < FIRST_SEED
+    seeds = [call.kwargs["seed"] for call in recorder.render.call_args_list]
+    assert len(set(seeds)) == len(seeds) == 3 + 2 * 3 and max(seeds) < FIRST_SEED
     with pytest.raises(Exception, match="has neither"):
         load_dataset(tmp_path)
     writer.close()
     (tmp_path / "val_000").mkdir()
-
     train, test = load_dataset(tmp_path), load_dataset(tmp_path, "test")
     assert (len(train), len(test)) == (3, 2)
     assert test.frame_names == (["r_000", "r_001"] if layout == "blender" else ["test_000", "test_001"])
-    for image, maps in zip(np.concatenate([train.images, test.images]), recorder.maps):
+    for image, maps in zip(np.concatenate([train.images, test.images]), given):
         close_images(image, maps)
     focal = 0.5 * SIZE / np.tan(0.5 * 0.6911112070083618)
     assert train.intrinsics[0] == pytest.approx([focal, focal, SIZE / 2, SIZE / 2])
     assert test.world_poses == pytest.approx(orbit(2, 3.0233467, 30, 20), abs=1e-4)
-
-    for name, truth, maps in zip(test.frame_names, load_view_truths(test), recorder.maps[3:5]):
+    assert train.world_poses == pytest.approx(spiral(3, 3.0233467, (-20, 78)), abs=1e-4)
+    for name, truth, maps in zip(test.frame_names, load_view_truths(test), given[3:5]):
         solid = maps["alpha"] > 0.92
         assert np.array_equal(truth.normal_mask | ~solid, np.ones_like(solid))
         encoded = linear_to_srgb if layout == "blender" else np.asarray  # the other one keeps albedo linear
@@ -108,11 +103,10 @@ def test_files_hold_what_was_rendered(files, tmp_path, layout):
         else:
             assert truth.roughness is None and truth.metallic is None
     assert load_view_truths(train)[0].albedo is None
-
     assert list(relight_maps(test)) == ["a", "b_1"]
     for k, name in enumerate(relight_maps(test)):
         for i in range(2):
-            close_images(read_relit(test, i, name), recorder.maps[5 + 2 * k + i])
+            close_images(read_relit(test, i, name), given[5 + 2 * k + i])
 
 
 @pytest.fixture(scope="module")
@@ -142,8 +136,7 @@ def test_an_asset_scores_as_perfect_on_its_own_data(data, tmp_path):
     scores = json.loads(out.read_text())
     assert scores["relight"]["psnr"] > 40 and scores["novel_view"]["psnr"] > 40 and scores["albedo"]["psnr"] > 38
     assert scores["relight"]["lsq"]["scale"] == pytest.approx([1, 1, 1], abs=0.005)
-    assert set(scores["relight"]["maps"]) == {"blue", "sunny"}
-    assert scores["normal_mae_deg"] < 1
+    assert set(scores["relight"]["maps"]) == {"blue", "sunny"} and scores["normal_mae_deg"] < 1
     assert scores["roughness_mae"] < 0.01 and scores["metallic_balanced_accuracy"] > 0.97
     assert scores["light_psnr"] == 100 and scores["f_score"] == 1 and scores["chamfer"] < 0.01
 
@@ -154,8 +147,13 @@ def test_cameras_look_at_the_origin():
         assert poses[:, :3, 2] * 3 == pytest.approx(poses[:, :3, 3])
         assert np.linalg.det(poses[:, :3, :3]) == pytest.approx(1)
         assert np.abs(poses[:, 2, 0]).max() < 1e-12 and (poses[:, 2, 1] > 0).all()
-    heights = np.degrees(np.arcsin(spiral(20, 3.0, (-20, 70))[:, 2, 2]))
-    assert (heights.min(), heights.max()) == pytest.approx((-20, 70))
+    backs = {"orbit": orbit(8, 3.0, 30, swing=20)[:, :3, 2], "spiral": spiral(3, 3.0, (-20, 70), turn=15)[:, :3, 2]}
+    azimuths = {name: np.degrees(np.arctan2(back[:, 1], back[:, 0])) % 360 for name, back in backs.items()}
+    assert azimuths["orbit"] == pytest.approx(22.5 + 45 * np.arange(8))
+    assert azimuths["spiral"] == pytest.approx((15 + 222.4922 * np.arange(3)) % 360, abs=1e-3)  # of the golden ratio
+    assert np.degrees(np.arcsin(backs["orbit"][:, 2])) == pytest.approx([30, 50, 30, 10] * 2)
+    low, high = np.sin(np.radians([-20, 70]))
+    assert backs["spiral"][:, 2] == pytest.approx([low, (low + high) / 2, high])
 
 
 def test_equal_seeds_write_equal_files_and_others_differ(files, tmp_path):
@@ -165,6 +163,8 @@ def test_equal_seeds_write_equal_files_and_others_differ(files, tmp_path):
         out = synthesise(files / "balls.glb", files / "blue.exr", [], tmp_path / name, settings)
         images.append((out / "train/r_000.png").read_bytes())
     assert images[0] == images[1] != images[2]
+    sizes = [rendering.resized(np.ones((rows, 2 * rows, 3), np.float32)).shape for rows in (300, 16)]
+    assert sizes == [(256, 512, 3), (16, 32, 3)]
 
 
 def bad(files, tmp_path, **change):
@@ -172,34 +172,40 @@ def bad(files, tmp_path, **change):
     return synthesise(files / "balls.glb", **(known | change))
 
 
-def test_bad_input_writes_nothing(files, tmp_path):
+def test_bad_input_writes_nothing(files, tmp_path, capsys):
     (tmp_path / "full").mkdir()
     (tmp_path / "full/notes.txt").write_text("mine")
     with pytest.raises(Exception, match="full: exists and is not an empty folder"):
         bad(files, tmp_path, out=tmp_path / "full")
-    for numbers, layout, message in (
-        ((0, 1, 1, 1), "blender", "--size must be at least 1"),
-        ((8, 1, 1, 0), "blender", "--spp must be at least 1"),
-        ((8, 1, 1, 1), "nerf", "--layout must be one of"),
+    for settings, message in (
+        *(({name: 0}, f"--{name} must be at least 1 and") for name in ("size", "train", "test", "spp")),
+        ({"train": MOST_VIEWS + 1}, "--train must be at least 1 and at most"),
+        ({"seed": -1}, "--seed must not be negative"),
+        ({"layout": "nerfactor", "turntable": True}, "--turntable: the layout nerfactor has no word"),
+        ({"layout": "nerf"}, "--layout must be one of"),
     ):
         with pytest.raises(Exception, match=message):
-            bad(files, tmp_path, settings=SynthSettings(*numbers, layout=layout))
+            bad(files, tmp_path, settings=replace(SynthSettings(8, 1, 1, 1), **settings))
+    SynthSettings(1, MOST_VIEWS, 1, 1).check()
+    (tmp_path / "apart.gltf").write_text("{}")
+    assert not rendering.write_placed_glb(tmp_path / "apart.gltf", tmp_path / "out", np.zeros(3), 1.0)
     (tmp_path / "more").mkdir()
     (tmp_path / "more/relight_blue.exr").write_bytes((files / "blue.exr").read_bytes())
     with pytest.raises(Exception, match="two maps are called blue"):
         bad(files, tmp_path, relight=[files / "blue.exr", tmp_path / "more/relight_blue.exr"])
     assert not (tmp_path / "out").exists()
-    missing = "synth", files / "gone.glb", "--light", files / "blue.exr", "--out", tmp_path / "out"
-    assert command(*missing) == BAD_INPUT
-    assert not (tmp_path / "out").exists()
-
-
-# ---- built-in shapes ----
+    for words, said in (((files / "gone.glb",), "gone.glb"), (("a.glb", "--material", "metal"), "give --shape")):
+        assert said in refused(capsys, "synth", *words, "--light", files / "blue.exr", "--out", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
 
 
 TUNNELS = {"mug": 1, "rings": 1, "mask": 2}  # through the body; the others have none
 WALLS = {"bowl": 0.08, "mug": 0.08, "box": 0.08, "vase": 0.07, "shell": 0.06, "mask": 0.07}
 FLOORS = {"bowl": -0.87, "mug": -0.52, "box": -0.37, "vase": -0.73}  # where a ray down the axis ends
+# The largest x and -y, and the lowest and highest z.
+BOUNDS = {"bowl": (0.95, 0.95, -0.95, 0), "box": (0.7, 0.5, -0.45, 0.4), "vase": (0.6, 0.6, -0.8, 0.9)}
+BOUNDS |= {"mug": (0.55 + 0.27 + 0.045, 0.55, -0.6, 0.6), "mask": (0.7, 0.42 + 0.23, -0.95, 0.95)}
+BOUNDS |= {"rings": (0.9, 0.9, -0.6, 0.28), "plinth": (0.6, 0.6, -0.69, 0.6)}
 
 
 @pytest.fixture(scope="module")
@@ -212,8 +218,10 @@ def assets():
 def test_a_shape_is_one_closed_body_with_as_many_tunnels_as_it_says(assets, name):
     mesh = asset_mesh(assets[name])
     assert mesh.is_watertight and mesh.is_winding_consistent and mesh.body_count == 1
-    assert mesh.euler_number == 2 - 2 * TUNNELS.get(name, 0)
-    assert np.abs(mesh.vertices).max() < 1 and mesh.volume > 0
+    assert mesh.euler_number == 2 - 2 * TUNNELS.get(name, 0) and np.abs(mesh.vertices).max() < 1 and mesh.volume > 0
+    (_, y, low), (x, _, high) = mesh.bounds
+    assert (x, -y, low, high) == pytest.approx(BOUNDS.get(name, (x, -y, low, high)), abs=0.004)
+    assert (assets[name].materials[0].roughness, assets[name].materials[0].metallic) == (0.8, 0)
 
 
 def edges(length: float, radius: float) -> float:
@@ -221,28 +229,19 @@ def edges(length: float, radius: float) -> float:
     return (1 - np.pi / 4) * radius**2 * length
 
 
-def bowl() -> float:
-    """A shell of radii 0.87 and 0.95 below z = -0.04, and half a ring of radius 0.04 on it."""
-    outer, inner, low, rim = 0.95, 0.87, 0.04, 0.04
-    half = np.pi * (2 * (outer**3 - inner**3) / 3 - low * (outer**2 - inner**2))
-    return half + 2 * np.pi * (outer + inner) / 2 * np.pi * rim**2 / 2
+VOLUMES = {
+    # A shell of radii 0.87 and 0.95 below z = -0.04, and half a ring of radius 0.04 on it.
+    "bowl": np.pi * (2 / 3 * (0.95**3 - 0.87**3) - 0.04 * (0.95**2 - 0.87**2)) + np.pi * 1.82 * np.pi * 0.04**2 / 2,
+    # 1.4 x 1 x 0.85 with edges of 0.06, less a cavity with walls of 0.08, less the rim's two rounded edges of 0.04.
+    "box": 1.4 * 0.85 - edges(8.2, 0.06) - 1.24 * 0.84 * 0.77 - edges(2 * 2 * (1.32 + 0.92), 0.04),
+    # A ball of radius 0.45 that sinks 0.01 into a block of 1.2 x 1.2 x 0.4 with edges of 0.04.
+    "plinth": np.pi * (4 / 3 * 0.45**3 - 0.01**2 * (0.45 - 0.01 / 3)) + 1.2 * 1.2 * 0.4 - edges(4 * 2.8, 0.04),
+}
 
 
-def box() -> float:
-    """1.4 x 1 x 0.85 with edges of 0.06, less a cavity with walls of 0.08, less the rim's two rounded edges of 0.04."""
-    outer = 1.4 * 1.0 * 0.85 - edges(4 * 0.85 + 2 * (1.4 + 1.0), 0.06)
-    return outer - 1.24 * 0.84 * 0.77 - edges(2 * 2 * (1.32 + 0.92), 0.04)
-
-
-def plinth() -> float:
-    """A ball of radius 0.45 that sinks 0.01 into a block of 1.2 x 1.2 x 0.4 with edges of 0.04."""
-    sunk = np.pi * 0.01**2 * (0.45 - 0.01 / 3)
-    return 4 / 3 * np.pi * 0.45**3 - sunk + 1.2 * 1.2 * 0.4 - edges(4 * (1.2 + 1.2 + 0.4), 0.04)
-
-
-@pytest.mark.parametrize("volume", [bowl, box, plinth], ids=lambda f: f.__name__)
-def test_volumes_are_those_of_the_formulas(assets, volume):
-    assert asset_mesh(assets[volume.__name__]).volume == pytest.approx(volume(), rel=0.004)
+@pytest.mark.parametrize("name", VOLUMES)
+def test_volumes_are_those_of_the_formulas(assets, name):
+    assert asset_mesh(assets[name]).volume == pytest.approx(VOLUMES[name], rel=0.004)
 
 
 @pytest.mark.parametrize("name", WALLS)
@@ -308,27 +307,15 @@ def test_the_command_renders_a_shape_with_its_truth(files, tmp_path):
     assert asset.materials[0].roughness == 0.25 and asset.materials[0].metallic == 0
 
 
-def test_the_command_names_what_there_is():
-    assert synth_command.SHAPES == tuple(SHAPES) and synth_command.MATERIALS == tuple(MATERIALS)
+WRONG = {"--shape cup": SHAPES, "--shape mug --material wood": MATERIALS}
+WRONG |= dict.fromkeys(("", "a.glb --shape mug"), ("ASSET.glb", "--shape"))
 
 
-@pytest.mark.parametrize(
-    ("words", "listed"),
-    [
-        ("--shape cup", SHAPES),
-        ("--shape mug --material wood", MATERIALS),
-        ("", ["ASSET.glb", "--shape"]),
-        ("a.glb --shape mug", ["ASSET.glb", "--shape"]),
-    ],
-)
+@pytest.mark.parametrize("words, listed", WRONG.items())
 def test_wrong_names_are_refused_in_a_line_that_lists_the_right_ones(words, listed, capsys):
     with pytest.raises(SystemExit) as ended:
         build_parser().parse_args(f"synth {words} --light l.hdr --out o".split())
     assert ended.value.code == BAD_INPUT
     line = capsys.readouterr().err.splitlines()[-1]
     assert all(name in line for name in listed)
-
-
-def test_a_material_needs_a_shape(tmp_path, capsys):
-    words = f"synth a.glb --material metal --light l.hdr --out {tmp_path / 'o'}"
-    assert main(words.split()) == BAD_INPUT and "give --shape" in capsys.readouterr().err
+    assert synth_command.SHAPES == tuple(SHAPES) and synth_command.MATERIALS == tuple(MATERIALS)
