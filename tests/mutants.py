@@ -50,7 +50,7 @@ TESTS = {
     "splitnerf_tools/ablate/": "test_ablate.py",
     "splitnerf_tools/batch/": "test_many_scenes.py",
     "splitnerf_tools/bench/": "test_bench.py",
-    "splitnerf_tools/capture/": "test_capture.py test_turntable.py",
+    "splitnerf_tools/capture/": "test_capture.py test_turntable.py test_photo_files.py",
     "splitnerf_tools/commands/": "test_commands.py test_synth.py test_many_scenes.py test_ablate.py",
     "splitnerf_tools/demo/": "test_examples.py",
     "splitnerf_tools/doctor/": "test_doctor.py",

@@ -132,6 +132,8 @@ def test_a_folder_in_use_is_refused_and_its_owner_named(tmp_path):
             pass
         assert len(list((run / "sub").iterdir())) == 1  # what the owner is writing is left alone
     with locked(run):
+        with locked(run):  # a program may lock it again within
+            pass
         assert f"pid {os.getpid()} on " in (run / LOCK).read_text() and list((run / "sub").iterdir()) == []
     assert not (run / LOCK).exists()
 
@@ -151,15 +153,8 @@ def test_a_lock_that_its_owner_removed_meanwhile_is_none(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_program_locks_a_folder_once_and_may_lock_it_again_within(tmp_path):
-    with locked(tmp_path / "run"):
-        with locked(tmp_path / "run"):
-            pass
-        assert (tmp_path / "run" / LOCK).exists()
-
-
 def test_a_folder_that_stays_empty_is_removed(tmp_path):
-    """With those around it that it took; not where there is something in it, or where it was there before."""
+    """With those around it that it took; not one that was there before, where what a killed program left is removed alone."""
     (tmp_path / "there").mkdir()
     for folder in ("a/b", "there"):
         with pytest.raises(KeyError), locked(tmp_path / folder):
@@ -168,6 +163,11 @@ def test_a_folder_that_stays_empty_is_removed(tmp_path):
     with locked(tmp_path / "c/d"):
         (tmp_path / "c/mine").touch()
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["c", "mine", "there"]
+    for name in (f"{PARTIAL}abc.pt", ".mine.partial.pt"):
+        (tmp_path / "there" / name).touch()
+    with locked(tmp_path / "there"):
+        pass
+    assert [path.name for path in (tmp_path / "there").iterdir()] == [".mine.partial.pt"]
 
 
 def test_a_folder_that_was_removed_is_not_made_again(tmp_path):
@@ -207,18 +207,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, monkeypatch):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr(files.os, "open", fails)
-    with (
-        pytest.raises(InputError, match="a: cannot be written to .Read-only file system.; give"),
-        locked(tmp_path / "a"),
-    ):
+    words = "a: cannot be written to .Read-only file system.; give"
+    with pytest.raises(InputError, match=words), locked(tmp_path / "a"):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_what_a_killed_program_left_is_removed(tmp_path):
-    """And no other hidden file."""
-    for name in (f"{PARTIAL}abc.pt", ".mine.partial.pt"):
-        (tmp_path / name).touch()
-    with locked(tmp_path):
-        pass
-    assert [path.name for path in tmp_path.iterdir()] == [".mine.partial.pt"]

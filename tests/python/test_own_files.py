@@ -60,17 +60,6 @@ def test_a_folder_is_emptied_only_by_its_maker(mine, tmp_path):
     assert (mine / "thesis").exists()
 
 
-@pytest.mark.parametrize("name", ["work", "frames", "images"])
-def test_prepare_keeps_folders_of_its_names(mine, tmp_path, capsys, name):
-    (tmp_path / "photos").mkdir()
-    cv2.imwrite(str(tmp_path / "photos/a.png"), np.full((40, 60, 3), 99, np.uint8))
-    (mine / name).mkdir()
-    (mine / name / "thesis.txt").write_text("x")
-    before = contents(mine)
-    assert "mine: holds other files" in refused(capsys, "prepare", tmp_path / "photos", "--out", mine)
-    assert contents(mine) == before
-
-
 def test_masks_are_not_found_into_a_users_folder(mine):
     (mine / "thesis.txt").touch()
     with pytest.raises(InputError, match="mine: holds other files"):
@@ -146,18 +135,18 @@ def test_links_in_a_run_lead_nowhere(data, done, mine, capsys, name):
 
 def test_only_files_are_replaced(data, done, mine, capsys):
     os.mkfifo(mine / "pipe")
-    with (
-        pytest.raises(InputError, match="pipe: is a device or a pipe, which is not replaced"),
-        atomic_path(mine / "pipe"),
-    ):
+    said = "pipe: is a device or a pipe, which is not replaced"
+    with pytest.raises(InputError, match=said), atomic_path(mine / "pipe"):
         pass
-    for name in ("index.html", "chair_evaluation.json"):
+    names = "index.html", "chair_evaluation.json", "photo.png"
+    for name in names:
         (mine / name).write_text("mine")
     shutil.copy(done / "mesh.glb", mine / "chair.glb")
     assert "index.html: is not an earlier result" in refused(capsys, "inspect", data, "--out", mine / "index.html")
     said = refused(capsys, "evaluate", mine / "chair.glb", "--data", data)
     assert "chair_evaluation.json: is not an earlier result" in said
-    assert [(mine / name).read_text() for name in ("index.html", "chair_evaluation.json")] == ["mine"] * 2
+    assert "photo.png: exists" in refused(capsys, "evaluate", done, "--data", data, "--sheet", mine / "photo.png")
+    assert [(mine / name).read_text() for name in names] == ["mine"] * 3
 
 
 @pytest.mark.parametrize("name", ["mesh.obj", "mesh_albedo.png"])
@@ -168,27 +157,20 @@ def test_an_export_is_replaced_as_asked(done, mine, capsys, name):
     assert (mine / name).read_bytes() != b"mine"
 
 
-def test_a_sheet_replaces_nothing(data, done, mine, capsys):
-    (mine / "photo.png").write_bytes(b"photo")
-    assert "photo.png: exists" in refused(capsys, "evaluate", done, "--data", data, "--sheet", mine / "photo.png")
-    assert (mine / "photo.png").read_bytes() == b"photo"
+REPLACED = {"ablation.md": ("ablate", "data"), "batch.md": ("batch", "data"), "logs/ray.log": ("batch", "data")}
+REPLACED |= {"prefilter.png": ("bench", "prefilter")}
+REFUSED = [(name, words, "would be replaced") for name, words in REPLACED.items()]
+REFUSED += [("data/light.hdr", ("demo", *more), "data: holds other files") for more in ((), ("--overwrite",))]
+REFUSED += [(f"{name}/x.txt", ("prepare", "data"), "mine: holds other files") for name in ("work", "frames", "images")]
 
 
-def test_the_demo_renders_into_no_folder_of_the_users(mine, capsys):
-    (mine / "data").mkdir()
-    (mine / "data/light.hdr").write_text("mine")
-    for more in ((), ("--overwrite",)):
-        assert "data: holds other files" in refused(capsys, "demo", "--out", mine, *more)
-    assert (mine / "data/light.hdr").read_text() == "mine"
-
-
-@pytest.mark.parametrize("name", ["ablation.md", "prefilter.png", "batch.md", "logs/ray.log"])
-def test_tables_and_logs_replace_nothing_else(data, mine, capsys, name):
+@pytest.mark.parametrize(("name", "words", "said"), REFUSED)
+def test_files_of_the_users_stay(data, mine, capsys, name, words, said):
+    """In place of tables, logs and renderings, and beside photos that are prepared."""
     (mine / name).parent.mkdir(exist_ok=True)
     (mine / name).write_text("mine")
     before = contents(mine)
-    words = {"ablation.md": ("ablate", data), "prefilter.png": ("bench", "prefilter")}.get(name, ("batch", data))
-    assert "would be replaced" in refused(capsys, *words, "--out", mine)
+    assert said in refused(capsys, *(data if word == "data" else word for word in words), "--out", mine)
     assert contents(mine) == before
 
 

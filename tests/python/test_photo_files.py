@@ -11,10 +11,22 @@ from unittest.mock import Mock
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageOps
+from splitnerf.data.images import write_image
 from splitnerf.errors import InputError
-from splitnerf_tools.capture.photographs import find_photographs, read_upright, sharpness, write_frames
+from splitnerf_tools.capture.masks import mask_files
+from splitnerf_tools.capture.photographs import Photograph, find_photographs, read_upright, sharpness, write_frames
+from splitnerf_tools.capture.prepare import _upright_copies
 from table_scene import photograph, ring
+from tiny_runs import refused
+
+TOLD = [{}, {0x8827: (200, 400)}, {0x829A: 0.0}, {0x829D: 0.0}, {0x8827: 0}, {0x920A: 35.0}, {0x829D: 2.0}, {}]
+EXPOSURES = [1 / 16, 1 / 8, None, None, None, 1 / 16, 1 / 4, 1 / 16]
+MP4, MATROSKA = b"colrncl%c\0%c\0%c", b"\x55\xb0\x8f\x55\xb1\x81%c\x55\xba\x81%c"
+BRIGHT, USUAL = [MP4 % (b"x", 9, 18), MATROSKA % (9, 16), MATROSKA % (9, 18)], [MP4 % (b"c", 1, 1), MATROSKA % (1, 1)]
+TWO = np.random.default_rng(0).integers(0, 255, (2, 40, 60, 3), np.uint8)
+PLAIN_ONES = np.full((5, 150, 200, 3), 120, np.uint8) + np.arange(5, dtype=np.uint8)[:, None, None, None]
+UNFIT = [(TWO, "holds 2 different photos, fewer than 3; take 30"), (PLAIN_ONES, "show too little detail; put")]
 
 
 def write_video(path: Path, frames: Iterable[np.ndarray], code: str = "MJPG") -> None:
@@ -25,20 +37,22 @@ def write_video(path: Path, frames: Iterable[np.ndarray], code: str = "MJPG") ->
     writer.release()
 
 
-def test_files_tell_of_turns_and_exposures(tmp_path):
-    pixels = np.zeros((20, 30, 3), np.uint8)
-    pixels[:, :15] = 200
-    exif = Image.Exif()
-    exif[0x0112] = 6  # the camera was turned: rows run to the left
-    exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 2.0, 0x8827: 100, 0xA405: 26})
-    Image.fromarray(pixels).save(tmp_path / "a.jpg", exif=exif, quality=95)
-    (tmp_path / "b.jpg").write_bytes((tmp_path / "a.jpg").read_bytes())
-    Image.fromarray(pixels).save(tmp_path / "a.png")
+@pytest.mark.parametrize("orientation, told, exposure", [*zip(range(1, 9), TOLD, EXPOSURES)])
+def test_files_tell_of_turns_exposures_and_lenses(tmp_path, orientation, told, exposure):
+    """Photos are turned as Pillow turns them, and COLMAP reads the turned ones. Another focal length is another lens."""
+    exif, pixels = Image.Exif(), np.random.default_rng(0).integers(0, 256, (2, 20, 30, 3), np.uint8)
+    exif[0x0112] = orientation
+    for name, photo, other in zip("ab", pixels, ({}, told)):
+        exif.get_ifd(0x8769).update({0x829A: 0.01, 0x829D: 4.0, 0x8827: 100, 0x920A: 50.0} | other)
+        Image.fromarray(photo).save(tmp_path / f"{name}.png", exif=exif)
+    (tmp_path / "c.png").write_bytes((tmp_path / "a.png").read_bytes())  # the same photo
     first, second = find_photographs(tmp_path)
-    assert [first.name, second.name] == ["a_jpg", "a_png"]  # b.jpg is the same photo as a.jpg
-    assert (first.width, first.height) == (20, 30) and read_upright(first.path).shape == (30, 20, 3)
-    assert read_upright(first.path)[5].mean() > 150 > 50 > read_upright(first.path)[25].mean()
-    assert first.exposure == pytest.approx(0.25) and second.exposure is None
+    assert second.exposure == (exposure and pytest.approx(exposure))
+    assert (first.lens == second.lens) == (0x920A not in told)
+    expected = np.asarray(ImageOps.exif_transpose(Image.open(tmp_path / "a.png")))
+    assert (first.height, first.width) == expected.shape[:2] and np.array_equal(read_upright(first.path), expected)
+    copy = _upright_copies([first], tmp_path / "work") / "lens_1/a.png"
+    assert copy.is_symlink() == (orientation == 1) and np.array_equal(np.asarray(Image.open(copy)), expected)
 
 
 def test_damaged_exif_costs_no_photo(tmp_path):
@@ -60,22 +74,18 @@ def test_damaged_exif_costs_no_photo(tmp_path):
 
 def test_pictures_that_are_no_photos_are_told_of(tmp_path, capsys, monkeypatch):
     """And that a photo is HEIC whatever its name says."""
-    for name in ("a.avif", "b.png"):
+    (tmp_path / "d.jpg").mkdir()
+    with pytest.raises(InputError, match="holds no photos"):
+        find_photographs(tmp_path)
+    for name in ("a.AVIF", "b.PNG"):
         Image.new("RGB", (4, 4)).save(tmp_path / name)
     assert [photo.name for photo in find_photographs(tmp_path)] == ["b"]
-    assert "1 pictures of kinds that are not read are left out (a.avif)" in capsys.readouterr().err
-    (tmp_path / "c.jpg").write_bytes(b"\0\0\0\x18ftypheic")
+    assert "1 pictures of kinds that are not read are left out (a.AVIF)" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "pillow_heif", None)
-    with pytest.raises(InputError, match="c.jpg: HEIC photos need"):
-        find_photographs(tmp_path)
-
-
-@pytest.mark.parametrize("content, told", [(b"", "no photo that can be read"), (None, "holds no photos")])
-def test_bad_photos_are_named(tmp_path, content, told):
-    if content is not None:
-        (tmp_path / "a.jpg").write_bytes(content)
-    with pytest.raises(InputError, match=told):
-        find_photographs(tmp_path)
+    for content, told in ((b"\0\0\0\x18ftypheic", "c.jpg: HEIC photos need"), (b"", "no photo that can be read")):
+        (tmp_path / "c.jpg").write_bytes(content)
+        with pytest.raises(InputError, match=told):
+            find_photographs(tmp_path)
 
 
 def test_a_false_raw_photo_is_named(tmp_path, monkeypatch):
@@ -109,18 +119,18 @@ def test_libraries_say_nothing_beside_the_program(tmp_path, name, told):
 
 
 def test_the_sharpest_frames_of_a_video(tmp_path):
-    sharp = photograph(ring(3)[0], 320.0, 320, 240)[0]
+    """The last of the first window, the first of the second, and the last of the third, in their colours."""
+    sharp, shares = photograph(ring(3)[0], 320.0, 320, 240)[0], []
     blurred = cv2.GaussianBlur(sharp, (15, 15), 4)
-    write_video(tmp_path / "v.avi", (sharp if number in (2, 5, 9) else blurred for number in range(12)))
+    write_video(tmp_path / "v.avi", (sharp if number in (3, 4, 11) else blurred for number in range(12)))
     (tmp_path / "frames").mkdir()
-    write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, lambda share: None)
+    write_frames(tmp_path / "v.avi", tmp_path / "frames", 3, shares.append)
     frames = sorted((tmp_path / "frames").iterdir())
-    assert len(frames) == 3
-    assert min(sharpness(cv2.imread(str(frame))) for frame in frames) > 0.5 * sharpness(sharp)
-
-
-MP4, MATROSKA = b"colrncl%c\0%c\0%c", b"\x55\xb0\x8f\x55\xb1\x81%c\x55\xba\x81%c"
-BRIGHT, USUAL = [MP4 % (b"x", 9, 18), MATROSKA % (9, 16), MATROSKA % (9, 18)], [MP4 % (b"c", 1, 1), MATROSKA % (1, 1)]
+    assert [frame.name for frame in frames] == [f"frame_0000{i}.png" for i in (1, 2, 3)] and shares[-1] == 1
+    assert all(abs(cv2.imread(str(frame)) - 1.0 * sharp).mean() < 15 for frame in frames)
+    columns = np.tile(np.uint8([50, 150]), (8, 320))[..., None].repeat(3, 2)  # their Laplacian is 200 and -200 in turn
+    for photo in (columns, columns.swapaxes(0, 1), np.uint16(columns) * 257, columns.repeat(2, 0).repeat(2, 1)):
+        assert sharpness(photo) == pytest.approx(40000, rel=1e-3)
 
 
 @pytest.mark.parametrize(("box", "is_told"), [*((box, 1) for box in BRIGHT), *((box, 0) for box in USUAL)])
@@ -142,3 +152,45 @@ def test_a_video_that_is_cut_short_is_told_of(tmp_path, capsys):
     write_frames(tmp_path / "v.avi", tmp_path / "frames", 6, lambda share: None)
     assert "v.avi: cannot be read beyond frame 6 of 12" in capsys.readouterr().err
     assert len(list((tmp_path / "frames").iterdir())) == 3
+
+
+def no_masks(photos: list[Photograph], folder: Path, said: str) -> None:
+    """They are refused."""
+    with pytest.raises(InputError, match=said):
+        mask_files(photos, folder)
+
+
+def test_a_mask_that_may_be_anothers_is_refused(tmp_path):
+    """Two photos that differ in their suffixes; two masks that do."""
+    photos = [Photograph(tmp_path / f"a{suffix}", f"a{suffix}", 8, 6, None, "") for suffix in (".jpg", ".png")]
+    no_masks(photos, tmp_path, "has no mask a.png; add it or leave --masks out")
+    Image.new("L", (6, 8)).save(tmp_path / "a.png")
+    no_masks(photos, tmp_path, "a.png: is 6x8, its photo 8x6; make them equal")
+    Image.new("L", (8, 6)).save(tmp_path / "a.png")
+    no_masks(photos, tmp_path, r"a.png: may be the mask of a.jpg or of a.png; call it a.png.png")
+    no_masks(photos[1:], tmp_path, "every mask is black; give masks that are white on the object")
+    Image.new("RGB", (8, 6), "red").save(tmp_path / "a.png.png")
+    no_masks(photos, tmp_path, "a.png.png: is coloured")  # before COLMAP has run for minutes
+    soft, words = np.linspace(0, 128, 48, dtype=np.uint8).reshape(6, 8), np.arange(48, dtype=np.uint16).reshape(6, 8)
+    for mask, share in ((soft - (soft > 127), "49.8"), (5 * words, "0.4")):  # also bytes in 16 bits
+        Image.fromarray(mask).save(tmp_path / "a.png.png")
+        no_masks(photos, tmp_path, f"a.png.png: at most {share}% of white, is black; make it white on the object")
+    Image.fromarray(soft).save(tmp_path / "a.png.png")
+    (tmp_path / "notes.txt").touch(), (tmp_path / "notes.md").touch()  # of no photo
+    assert [path.name for path in mask_files(photos, tmp_path).values()] == ["a.png", "a.png.png"]
+    for name in ("a.png", "a"):
+        Image.new("L", (8, 6)).save(tmp_path / f"{name}.bmp")
+        no_masks(photos, tmp_path, f"/{name}.png: may be a mask of the same photo as {name}.bmp; delete one of them")
+    Image.new("L", (8, 6), 255).save(tmp_path / "u\u0308.png")  # of a system that keeps letters with accents otherwise
+    (found,) = mask_files([Photograph(tmp_path / "\u00fc.jpg", "u", 8, 6, None, "")], tmp_path).values()
+    assert found.name == "u\u0308.png"
+
+
+@pytest.mark.parametrize("photos, said", [*UNFIT, (PLAIN_ONES - 120, "all photos are too dark; expose them longer")])
+def test_photos_that_show_too_little_are_refused(tmp_path, capsys, photos, said):
+    for i, pixels in enumerate(photos):
+        write_image(tmp_path / f"photos/{i}.png", pixels / np.float32(255))
+    words = "prepare", tmp_path / "photos", "--out", tmp_path / "data"
+    (tmp_path / "masks").mkdir()
+    assert "masks: has no mask 0.png" in refused(capsys, *words, "--masks", tmp_path / "masks")  # before the cameras
+    assert not (tmp_path / "data/work").exists() and said in refused(capsys, *words)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import torch
 from blender_data import edit, look_at, make_blender
 from painted_ball import lamps, photos
+from PIL import Image
 from scipy.spatial.transform import Rotation
 from splitnerf.cli import DONE, main
 from splitnerf.data.dataset import dataset_fingerprint, load_dataset
@@ -49,31 +51,42 @@ def test_the_light_turns_as_the_camera_seems_to():
 
 
 def test_what_turns_before_a_backdrop_is_found():
-    """A square of noise that is elsewhere in each photo, before noise that stands still, from two heights of the stand."""
+    """A square of noise that is elsewhere in each photo, before noise that stands still, from three heights of the stand."""
     random = np.random.default_rng(0)
     views, squares = [], []
-    for height in range(2):
+    for height in range(3):
         backdrop = random.integers(0, 256, (60, 80, 3)).astype(np.uint8)
-        for k in range(6):
+        for k in range(5):
             photo, square = backdrop.copy(), np.s_[20 + height : 40, 4 + 12 * k : 16 + 12 * k]
             photo[square] = random.integers(0, 256, photo[square].shape)
-            views.append(photo)
+            views.append(reduced(photo))
             squares.append(square)
-    views = [reduced(photo) for photo in views]
     for moving, square in zip(moving_pixels(views), squares):
         inside = np.zeros((60, 80), bool)
         inside[square] = True
         assert moving[inside].mean() > 0.95 and moving[~inside].mean() < 0.1
-    assert not np.any(moving_pixels([views[0]] * 4))
     assert np.all(moving_pixels(views[:2], ["one lens", "another"]))
+    for step, n_moving in ((7, 0), (8, 172)):  # a square of 10 x 10 without its corners, grown by two; not one pixel
+        plain = np.zeros((4, 30, 40, 3), np.int16)
+        plain[0, 10:20, 10:20, 1], plain[0, 5, 30] = step, 200
+        assert [moving.sum() for moving in moving_pixels(plain)] == [n_moving, 0, 0, 0]
+    large = reduced(np.full((480, 640, 3), 40 << 8, np.uint16))
+    assert large.dtype == np.int16 and large.shape == (240, 320, 3) and (large == 40).all()
 
 
-def test_photos_in_which_nothing_turns_are_refused(tmp_path):
+@pytest.mark.parametrize("edge", [0, 16, 20])
+def test_photos_in_which_nothing_turns_are_refused(tmp_path, edge):
+    """Or as good as nothing: less than 0.2 % of the pixels, with two around them at half the size."""
     for i in range(3):
-        write_image(tmp_path / f"lens_1/{i}.png", np.full((30, 40, 3), 0.5))
-    with pytest.raises(InputError, match="nothing turns; leave --turntable out"):
-        write_moving(tmp_path / "lens_1", tmp_path / "moving", lambda share: None)
-    assert not (tmp_path / "moving").exists()
+        photo = np.full((480, 640, 3), 0.5)
+        photo[40 : 40 + edge, 100 * i + 50 : 100 * i + 50 + edge] = 1
+        write_image(tmp_path / f"photos/lens_1/{i}.png", photo)
+    with nullcontext() if edge == 20 else pytest.raises(InputError, match="nothing turns; leave --turntable out"):
+        write_moving(tmp_path / "photos", tmp_path / "moving", lambda share: None)
+    assert (tmp_path / "moving").exists() == (edge == 20)
+    if edge == 20:
+        mask = np.asarray(Image.open(tmp_path / "moving/lens_1/2.png.png"))
+        assert mask.shape == (480, 640) and (mask[40:60, 250:270] == 255).all() and mask.sum() == 255 * 4 * 172
 
 
 def random_turns(n: int, seed: int = 0) -> torch.Tensor:
@@ -99,15 +112,10 @@ def test_the_rotations_of_the_light_are_read(tmp_path):
     assert turned.light_turns[[0, 5]] == pytest.approx(np.tile(np.eye(3), (2, 1, 1)))
     assert turned.select([2]).light_turns == pytest.approx(turn[None])
     assert dataset_fingerprint(turned) != dataset_fingerprint(still)
-
-
-@pytest.mark.parametrize("matrix", [2 * np.eye(3), -np.eye(3), np.eye(4), "z", 3.0])
-def test_what_is_no_rotation_is_refused(tmp_path, matrix):
-    make_blender(tmp_path, train=6, test=2)
-    given = matrix.tolist() if isinstance(matrix, np.ndarray) else matrix
-    edit(tmp_path, lambda meta: meta["frames"][1].update(light_rotation=given))
-    with pytest.raises(InputError, match="light_rotation' of frame 1"):
-        load_dataset(tmp_path)
+    for given in (*(matrix.tolist() for matrix in (2 * np.eye(3), -np.eye(3), np.eye(4))), "z", 3.0):  # no rotations
+        edit(tmp_path, lambda meta, given=given: meta["frames"][1].update(light_rotation=given))
+        with pytest.raises(InputError, match="light_rotation' of frame 1"):
+            load_dataset(tmp_path)
 
 
 def test_points_look_up_the_light_in_its_own_frame():
