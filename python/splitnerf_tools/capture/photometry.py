@@ -57,7 +57,7 @@ def find_exposures(
     gains, points = start.copy(), np.zeros(m)
     weights = np.ones(k)
     for _ in range(ROUNDS):
-        factor = 1 + squares @ corners
+        factor = np.maximum(1 + squares @ corners, 0.05)
         entries = np.concatenate([np.ones(k), np.ones(k), *(squares / factor[:, None]).T])
         columns = np.concatenate([photo_of, n + point_of, np.full(k, n + m), np.full(k, n + m + 1)])
         model = coo_matrix((entries, (np.tile(rows, 4), columns)), shape=(k, n + m + 2))
