@@ -93,8 +93,7 @@ def test_without_a_table_up_is_the_cameras_mean():
     scene, of_ball = found_scene()
     alone = replace(scene, points=scene.points[of_ball])
     world = settle(moved(alone, 0), 0)
-    assert not world.table
-    assert np.allclose(world.scene.points[:, 2], alone.points[:, 2] - BALL[2], atol=0.03)
+    assert not world.table and np.allclose(world.scene.points[:, 2], alone.points[:, 2] - BALL[2], atol=0.03)
     astray = look_at(np.array([3.0, 0, 1]), np.array([0, 2.0, 1]))
     assert np.allclose(meeting_point(np.array([*scene.poses, astray])), BALL, atol=0.01)
 
@@ -117,13 +116,13 @@ def test_exposures_and_vignetting_come_back():
     radiance = random.uniform(0.05, 0.9, m)
     photo, point = np.divmod(random.choice(n * m, 5000, replace=False), m)
     radii = random.uniform(0, 1, 5000)
-    values = gains[photo] * (1 - 0.25 * radii**2 - 0.1 * radii**4) * radiance[point]
+    values = gains[photo] * (1 + 0.3 * radii**2 - 0.6 * radii**4) * radiance[point]
     values *= np.exp(random.normal(scale=0.02, size=5000))
     values[random.random(5000) < 0.05] *= 2  # shiny
     values[:40] = 0
     found = find_exposures(photo, point, values.clip(0, 1), radii, np.full(n, np.nan))
     assert abs(np.log(found.gains / gains)).max() < 0.015
-    assert abs(np.array([[0.25, 0.0625], [1, 1]]) @ (np.array(found.vignetting) + [0.25, 0.1])).max() < 0.02
+    assert abs(np.array([[0.25, 0.0625], [1, 1]]) @ (np.array(found.vignetting) - [0.3, -0.6])).max() < 0.02
     found = find_exposures(*np.zeros((2, 0), int), *np.zeros((2, 0)), np.array([1.0, np.nan, 4.0]))
     assert np.allclose(found.gains, [0.5, 1, 2], rtol=1e-4) and found.vignetting == (0.0, 0.0)
     found = find_exposures(np.arange(2), np.zeros(2, int), np.array([0.4, 0.404]), np.array([0.0, 1.0]), np.ones(2))
@@ -380,12 +379,12 @@ def test_surroundings_are_what_the_object_sees():
 @pytest.mark.parametrize("clipped, share", [(0, 0.75), (4, 5 / 12), (5, 0.0)])
 def test_a_direction_is_known_by_its_pixels(clipped, share):
     """Nine of twelve that make it fully known: each third, beside three at the object's edge. White ones tell of more light."""
-    image, mask = np.full((3, 300, 3), 128, np.uint8), np.arange(300) < 270
+    image, mask = np.full((3, 300, 3), 128, np.uint8), np.arange(300) < 269
     image[:, 273 : 273 + 3 * clipped] = 255
     lens, pose = Lens(300, 3, 1e7, 1e7, 150, 1.5, 0, 0, 0, 0), look_at(np.array([3.0, 1, -1]), np.zeros(3))
     found = surroundings([Shot(image, np.tile(mask, (3, 1)), pose, lens, 0.5)], np.zeros(3), 0.0).reshape(-1, 4)
-    expected = [[*[2 * srgb_to_linear(np.float32([128 / 255]))[0]] * 3, share]] if share else np.zeros((0, 4))
-    assert np.allclose(found[found[:, 3] > 0], expected)
+    expected = [pytest.approx([*[2 * srgb_to_linear(np.float32([128 / 255]))[0]] * 3, share])] if share else []
+    assert found[found[:, 3] > 0].tolist() == expected
 
 
 @pytest.mark.parametrize("turntable", [False, True])
@@ -425,7 +424,8 @@ def test_photos_become_data_by_their_cameras(tmp_path, monkeypatch, capsys, turn
         turned = np.array(frame.get("light_rotation", np.zeros((3, 3)))) @ pose[:3, 3]
         assert turned == pytest.approx([np.hypot(*pose[:2, 3]), 0, pose[2, 3]] if turntable else np.zeros(3), abs=0.05)
     assert (around := out / "surroundings.exr").exists() != turntable
-    assert turntable or np.divide(*read_image(around).mean((0, 1))[[0, 2]]) > 1.2  # red by blue, of the table
+    red, green, blue, _ = (5, 5, 3, 1) if turntable else read_image(around).mean((0, 1))
+    assert red > 1.2 * blue and green > 0.8 * red  # as of the table
     page = (out / "prepare.html").read_text()
     n, k, share = len(world.scene.points), world.object_points.sum(), f"{min(covered):.1f} to {max(covered):.1f} %"
     tiles = f"12 of {17 + turntable}|0.30 pixels|{n}, {k} on the object|found|{share}|0.74 to 1.34"
