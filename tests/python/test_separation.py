@@ -188,8 +188,7 @@ class TestRuns:
         """Trains with the masks by a field that is right, and scores the run again with them."""
         masks, run = write_ball_on_floor(tmp_path / "data"), tmp_path / "run"
         monkeypatch.setattr(separation, "train_field", lambda dataset, **_: TrueField(dataset.world_from_box))
-        assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30") == 0
-        assert overlap(run, masks) > 0.9
+        assert train(tmp_path / "data", run, "--eval-mode=all", "--steps=30") == 0 and overlap(run, masks) > 0.9
         assert (run / SEPARATED / "sheet.jpg").is_file() and (run / "mesh.glb").is_file()
         around = read_image(run / SEPARATED / "surroundings.exr")
         assert np.abs(around[8, :, :3] - [0.214, 0.319, 0.787]).max() < 1e-3  # the sky
@@ -199,7 +198,7 @@ class TestRuns:
         np.testing.assert_allclose([*found["normal"], found["offset"]], [0, 0, 1, 0], atol=0.01)
         assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 0
         (run / SEPARATED / "images/p0.png").write_bytes(b"")
-        assert train(tmp_path / "data", run, "--eval-mode", "all", "--steps", "30", "--overwrite") == 0
+        assert train(tmp_path / "data", run, "--eval-mode=all", "--steps=30", "--overwrite") == 0
         assert overlap(run, masks) > 0.9  # found anew
         (run / SEPARATED / "separation.json").unlink()
         assert main(["evaluate", str(run), "--data", str(tmp_path / "data"), "--spp", "1"]) == 2
@@ -241,15 +240,16 @@ class TestRuns:
         assert max(apart[np.stack(ball[0])].mean(), apart.mean()) < 0.03 and tiles[8].max() < 0.1
 
     def test_training_lowers_the_error(self, ball, monkeypatch):
-        """By a rate that grows over a hundred steps and falls to 3 % in the end; or until the time is up, or numbers are no more."""
-        told, rates, step, run = [], [], torch.optim.Adam.step, lambda *now: told.append(now)
+        """From grey; by a rate that grows over a hundred steps and falls to 3 %; to the last step, the end of the time or NaN."""
+        told, rates, grey = [], [], np.full((8, SIZE, SIZE, 4), 0.8, np.float32)
+        step, run = torch.optim.Adam.step, lambda *now: told.append(now)
         monkeypatch.setattr(training, "RAYS", 128)
         monkeypatch.setattr(torch.optim.Adam, "step", lambda a: rates.append(a.param_groups[0]["lr"]) or step(a))
-        training.train_field(ball[1], steps=150, minutes=0, seed=0, report=run)
-        training.train_field(ball[1], steps=9, minutes=1e-9, seed=0, report=run)
+        for at, steps, minutes in (ball[1], 150, 0), (replace(ball[1], images=grey), 9, 1e-9):
+            training.train_field(at, steps=steps, minutes=minutes, seed=0, report=run)
         psnr = [float(text.split()[3]) for _, text in told]
-        assert psnr[149] > psnr[0] + 2 and told[149][0] == told[150][0] == 1 and len(told) == 151
-        assert rates[0:150:99] == pytest.approx([1e-4, 0.01 * 0.03 ** (99 / 150)])
+        assert psnr[149] > psnr[0] + 2 and [told[k][0] for k in (149, 150)] == [1, 1] and len(told) == 151
+        assert rates[0:150:99] == pytest.approx([1e-4, 0.01 * 0.03**0.66]) and psnr[150] == pytest.approx(10.5, abs=2)
         monkeypatch.setattr(training, "SPREAD_WEIGHT", math.nan)
         with pytest.raises(RuntimeError, match="no longer finite at step 2"):
             training.train_field(ball[1], steps=5, minutes=0, seed=0, report=run)
@@ -266,7 +266,7 @@ class TestMasks:
         """Parts below a hundredth of it; a faint bridge joins parts, and what is fainter stays everywhere; specks alone stay."""
         mask = np.full((40, 60), 0.05, np.float32)
         mask[5:35, 5:30], mask[10:20, 40:50], mask[6, 30:33], mask[6, 33] = 0.8, 1.0, 0.2, 1.0  # 754, 100 pixels
-        mask[2, 30:38] = mask[38, 30:37] = 1
+        mask[2, 30:38], mask[38, 30:37] = 1, 1
         cleaned = mask * ~((np.arange(40) == 38)[:, None] & (mask == 1))
         np.testing.assert_array_equal(finding.without_specks(mask), cleaned)
         assert not finding.without_specks(np.zeros((4, 5), np.float32)).any()
