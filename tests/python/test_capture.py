@@ -64,8 +64,7 @@ def found_scene(n: int = 12) -> tuple[Reconstruction, np.ndarray]:
     far = random.normal(size=(200, 3)) * 10 + 20
     points = np.concatenate([ball, table, far])
     names, seen = [f"p_{i:02d}.MP" for i in range(n)], (np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
-    scene = Reconstruction(names, ring(n), [PLAIN] * n, points, *seen, error=0.3)
-    return scene, np.arange(len(points)) < len(ball)
+    return Reconstruction(names, ring(n), [PLAIN] * n, points, *seen, error=0.3), np.arange(len(points)) < len(ball)
 
 
 def moved(scene: Reconstruction, seed: int) -> Reconstruction:
@@ -323,8 +322,7 @@ def held(kind: str, image: np.ndarray, i: int) -> np.ndarray:
 @pytest.mark.parametrize("kind", [*KINDS, pytest.param("masks to find", marks=pytest.mark.slow)])
 def test_photos_to_data(tmp_path, capsys, monkeypatch, kind):
     """Photos through the command: cameras, masks and a page; the data load. To find masks it needs more of them."""
-    given, turntable, is_cut = kind != "masks to find", kind == "turntable", kind == "three sizes"
-    n = 12 if given else 20
+    turntable, is_cut, given, n = kind == "turntable", kind == "three sizes", kind in KINDS, 12 if kind in KINDS else 20
     truth = write_photos(tmp_path / "photos", n, turntable)
     (tmp_path / "masks").mkdir()
     balls = [held(kind, photograph(pose, *CAMERA)[1], i) for i, pose in enumerate(truth)]
@@ -394,6 +392,8 @@ def test_photos_become_data_by_their_cameras(tmp_path, monkeypatch, capsys, turn
     gains, (y, x) = np.exp(np.linspace(-0.3, 0.3, 12)), np.mgrid[:240, :320] + 0.5
     corners = 1 - 0.3 * ((x - 240) ** 2 + (y - 120) ** 2)[..., None] / (160**2 + 120**2)
     balls[3] = balls[3] & (y < 120)
+    on = [np.mean([balls[4][int(2 * y), int(2 * x)] for x, y in dots]) for dots in masks.dots_of(world, 4, 160)]
+    assert on[0] > 0.95 and on[1] < 0.05
     lights = [0.6 * srgb_to_linear(photo / np.float32(255)) for photo in photos]
     pictures = {f"p_{i:02d}.MP": linear_to_srgb(np.float32(gains[i] * corners * lights[i])) for i in range(12)}
     pictures |= {"black": np.full((240, 320, 3), 0.015), "soft": 0.3 * pictures["p_06.MP"]}
