@@ -60,7 +60,7 @@ class TestRegion:
 
     @pytest.mark.parametrize("table", [None, Table(np.array([0.0, 0, 1]), -0.3)])
     def test_parts_count_by_their_size_and_place(self, table):
-        """A tube and what stands over it, not what stands apart, a speck, or cells of one point; filled, larger, down to a table."""
+        """A tube and what stands over it, not what stands apart, a speck, or cells of one point; filled, larger, to a table."""
         cells = np.zeros((6, *(CELLS,) * 3), bool)
         cells[0, 33:63, 33:63, 44:56] = cells[1, 58:64, 50:56, 64:69] = cells[2, 70:76, 45:51, 45:50] = True
         cells[3, 40:45, 40:45, 64:69] = cells[4, 36:42, 50:56, 72:75] = cells[5, 86:94, 10:86, 44:60] = True
@@ -373,7 +373,7 @@ class TestMasks:
 
 
 class TestFoot:
-    TABLE = Table(np.array([0.0, 0.6, 0.8]), -0.1)
+    TABLE, MIDDLE = Table(np.array([0.0, 0.6, 0.8]), -0.1), np.array([0.2, -0.15])
 
     def scene(self, height: float, noise: float, radius: float = 0.4, post=(0, 0.1), tint: float = 1.0):
         """Points of a table and of a round plinth on it, their colours, and points of a post between two radii."""
@@ -382,12 +382,12 @@ class TestFoot:
         plinth, (inner, outer) = np.linalg.norm(at, axis=1), post
         over, plinth = (plinth > inner) & (plinth < outer), plinth < radius
         heights = np.where(plinth, height, 0.0) + random.normal(size=len(at)) * noise
-        points = at @ self.TABLE.axes + (self.TABLE.offset + heights)[:, None] * self.TABLE.normal
+        points = self.lifted(at, heights[:, None]).astype(float)
         colours = 0.5 + tint * np.where(plinth[:, None], -0.2, 0.3 * np.sin(40 * at[:, :1] + [0, 1, 2]))
         return points, colours, self.lifted(at[over], 0.3)
 
-    def lifted(self, at: np.ndarray, height: float) -> np.ndarray:
-        return (at @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal).astype(np.float32)
+    def lifted(self, at: np.ndarray, height: float | np.ndarray) -> np.ndarray:
+        return np.float32((at + self.MIDDLE) @ self.TABLE.axes + (self.TABLE.offset + height) * self.TABLE.normal)
 
     def over(self, radius: float, height: float) -> torch.Tensor:
         angle = np.linspace(0, 2 * np.pi, 60)
@@ -408,7 +408,7 @@ class TestFoot:
     def test_feet(self, scene, shown, held, others):
         """What no photo shows within a foot is the foot's; below an overhang, points decide by their height."""
         points, colours, post = self.scene(*scene)
-        radius = np.linalg.norm(points @ self.TABLE.axes.T, axis=1)
+        radius = np.linalg.norm(points @ self.TABLE.axes.T - self.MIDDLE, axis=1)
         chosen = (radius > shown[0]) & ((radius < shown[1]) | (radius > 0.4) | (np.arange(len(points)) % 20 == 0))
         foot = find_foot(self.TABLE, points[chosen], colours[chosen], post)
         assert all(foot.holds(self.over(*at)).all() for at in held)
@@ -416,7 +416,7 @@ class TestFoot:
 
     def test_what_stands_apart_is_not_the_foot(self):
         points, colours, post = self.scene(0.012, 0.003)
-        apart = np.linalg.norm(points @ self.TABLE.axes.T - [0.6, 0.6], axis=1) < 0.1
+        apart = np.linalg.norm(points @ self.TABLE.axes.T - self.MIDDLE - [0.6, 0.6], axis=1) < 0.1
         foot = find_foot(self.TABLE, points + apart[:, None] * 0.02 * self.TABLE.normal, colours, post)
         beside = torch.from_numpy(self.lifted(np.array([[0.6, 0.6]]), 0.0))
         assert foot.holds(self.over(0.2, 0.0)).all() and not foot.holds(beside).any()
@@ -427,7 +427,7 @@ class TestFoot:
     def test_where_heights_are_wrong_colour_decides(self, place, raised, held, light):
         """A notch in the plinth's edge, and a bump of the table beside it; also in a shadow that falls on both."""
         points, colours, post = self.scene(0.012, 0.003)
-        at = points @ self.TABLE.axes.T
+        at = points @ self.TABLE.axes.T - self.MIDDLE
         colours = np.where(np.linalg.norm(at - [0.4, 0], axis=1)[:, None] < 0.15, light, 1) * colours
         wrong = (np.linalg.norm(at - [place, 0], axis=1) < 0.05) & ((np.linalg.norm(at, axis=1) < 0.4) == held)
         foot = find_foot(self.TABLE, points + wrong[:, None] * raised * self.TABLE.normal, colours, post)
