@@ -34,8 +34,8 @@ template <class T> SPLITNERF_HD T depth_at(T f, T s) {
 template <class T> struct Walk {
   RayLattice<T> lattice;
   int64_t ray;
-  int64_t next;       // the sample at which the distance is asked for next; -1 where the ray has ended
-  int64_t last = -1;  // the one before, -1 for none
+  int64_t next;        // the sample at which the distance is asked for next; -1 where the ray has ended
+  int64_t last = -1;   // the one before, -1 for none
   int64_t stride = 1;  // so many samples on from `last`; further ones up to `next` are in empty cells
   int64_t n_evaluated = 0;
   int n_returns = 0;       // how often it went back
