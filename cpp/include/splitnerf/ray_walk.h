@@ -97,8 +97,7 @@ SPLITNERF_HD void advance(Walk<T>& walk, T f, const OccupancyView& grid, const M
   const T depth = depth_at(f, rules.s);
   if (walk.last >= 0) {
     const T transmitted = exp_of_minus(max_of(depth - walk.depth_last, T(0)));
-    const int64_t apart = walk.next - walk.last;
-    if (may_weigh(rules, walk, {f, depth, T(apart) * step, T(min_of(apart, walk.stride)) * step, transmitted})) {
+    if (may_weigh(rules, walk, {f, depth, T(walk.next - walk.last) * step, T(walk.stride) * step, transmitted})) {
       if (!walk.last_kept) keep(walk.lattice.start(walk.last));
       kept = true;
     }
