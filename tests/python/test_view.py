@@ -385,7 +385,8 @@ def test_a_signal_ends_it_in_peace(shown_run, number):
         assert process.wait(60) == DONE and process.stderr.read() == ""
 
 
-silent = lambda server: create_connection(server.server_address, timeout=5)  # noqa: E731
+def silent(server):
+    return create_connection(server.server_address, timeout=5)
 
 
 def wait_until(wanted) -> None:
@@ -402,8 +403,7 @@ def test_silent_connections_leave_files_for_the_run(served, monkeypatch):
         with ExitStack() as stack:
             many = [stack.enter_context(silent(served)) for _ in range(server_module.MOST_OPEN + 20)]
             assert [page.recv(1) for page in many[server_module.MOST_OPEN :]] == [b""] * 20  # closed at once
-            with open(__file__):
-                pass
+            open(__file__).close()
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
     wait_until(lambda: served._open == 0)

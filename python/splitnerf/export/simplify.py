@@ -71,7 +71,7 @@ def capped(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[n
 def _filled(vertices: np.ndarray, faces: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What :func:`capped` returns of faces with holes: a fan of triangles fills each, and small parts that are now apart go."""
     points, faces = split_pinches(*_compact(np.column_stack([vertices, seen]), faces))
-    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    start, end = trimesh.geometry.faces_to_edges(faces).astype(np.int64).T
     rim = ~np.isin(start * len(points) + end, end * len(points) + start)
     start, end = start[rim], end[rim]
     label = connected_component_labels(np.stack([start, end], axis=1), len(points))
