@@ -245,8 +245,8 @@ def test_held_out_pixels_decide_whether_colours_pull(painted, monkeypatch):
     fit = Refinement(data, asset, sky(), FitSettings(sweep_share=0.05, pixels=200))
     pulls = calls(monkeypatch, NormalEquations, "step", lambda self, unknowns, usual: usual is not None)
     errors = np.array([1.0, 1.1, 0.9, 1.0])
-    alike = [errors, errors[[1, 0, 2, 3]]]  # no clear difference
-    held = iter([*alike, *alike, errors, errors + 1.0, errors, errors])
+    alike, half = errors[[1, 0, 2, 3]], 0.995 * errors  # no clear difference; half a percent
+    held = iter([errors, alike, errors, half, errors, errors + 1.0, errors, errors])
     monkeypatch.setattr(fit, "held_errors", lambda: next(held))
     assert all(np.array_equal(fit.sweep()[1], errors) for _ in range(5))
     judged = [True, False]

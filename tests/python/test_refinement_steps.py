@@ -8,7 +8,7 @@ from splitnerf.data.environment import sample_environment
 from splitnerf.refinement.light import EnvironmentLight, footprints, read
 from splitnerf.refinement.light_equations import LightEquations, Rows
 from splitnerf.refinement.normal_equations import APART, EDGE, NormalEquations, Prior
-from splitnerf.refinement.similar_texels import SimilarTexels, weighted_medians
+from splitnerf.refinement.similar_texels import SimilarTexels, weighted_quantiles
 from splitnerf.refinement.texels import TexelPairs
 from splitnerf.refinement.unknowns import GROUPS, N_UNKNOWNS
 
@@ -17,10 +17,10 @@ def chain(frame: torch.Tensor | None = None, m: int = 3, **weights: float) -> Pr
     """A prior of m texels, 1 - 2 and 0 - 1 joined, with one weight for all unknowns; `frame` turns tilts of 1 into the frame of 0."""
     of_all = {name: torch.full((N_UNKNOWNS,), weights.get(name, 0.0)) for name in ("smooth", "flat", "anchor")}
     pairs = TexelPairs(m, np.array([[1, 2], [0, 1]]), torch.empty(0, 2, 2) if frame is None else frame[None])
-    return Prior(pairs=pairs, groups=GROUPS, like=weights.get("like", 0.0), **of_all)
+    return Prior(pairs=pairs, groups=GROUPS, like=torch.full((2,), weights.get("like", 0.0)), **of_all)
 
 
-def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = None, n_steps: int = 60) -> torch.Tensor:
+def fitted(prior: Prior, observed: torch.Tensor, usual: torch.Tensor | None = None) -> torch.Tensor:
     """[m, n] where the steps end if each unknown of each texel was observed once, with one precision."""
     m = len(observed)
     equations, unknowns = NormalEquations(torch.zeros(m, N_UNKNOWNS), prior, 0.0), torch.zeros(m, N_UNKNOWNS)
@@ -47,8 +47,9 @@ def test_normals_across_a_seam_are_compared_in_one_frame():
     observed[0, 5:] = frame @ observed[1, 5:]
     torch.testing.assert_close(fitted(prior, observed), observed)
     values, rows = torch.randn(3, N_UNKNOWNS), torch.randn(2, N_UNKNOWNS)
-    pairs = prior.pairs
-    torch.testing.assert_close((pairs.differences(values) * rows).sum(), (values * pairs.adjoint(rows)).sum())
+    torch.testing.assert_close(
+        (prior.pairs.differences(values) * rows).sum(), (values * prior.pairs.adjoint(rows)).sum()
+    )
 
 
 def test_small_differences_are_smoothed_and_edges_are_kept():
@@ -68,30 +69,33 @@ def test_small_differences_are_smoothed_and_edges_are_kept():
     assert abs(found[2, 5] - found[1, 5]) < abs(found[1, 5] - found[0, 5])
 
 
-def test_a_usual_roughness_pulls_at_the_cost_that_is_written():
-    observed, usual = torch.zeros(3, N_UNKNOWNS), torch.tensor([0.3, 0.35, 0.3])
+@pytest.mark.parametrize("of", [0, 1])
+def test_a_usual_roughness_or_metallic_pulls_at_the_cost_that_is_written(of):
+    observed, usual = torch.zeros(3, N_UNKNOWNS), torch.full((3, 2), torch.nan)
     observed[:, 3:5] = torch.tensor([[0.3, 0.9], [0.3, 0.1], [0.9, 0.5]])
+    observed[:, 3 + of], usual[:, of] = torch.tensor([0.3, 0.3, 0.9]), torch.tensor([0.3, 0.35, 0.3])
     found = fitted(chain(like=0.5), observed, usual)
-    at = found[:, 3].clone().requires_grad_(True)
-    pull = 0.25 * APART**2 * torch.log1p(((at - usual) / APART).square()).sum()
-    assert torch.autograd.grad(0.5 * (at - observed[:, 3]).square().sum() + pull, at)[0].abs().max() < 1e-4
-    assert found[0, 3] == pytest.approx(0.3, abs=1e-5) and 0.31 < found[1, 3] < 0.32  # a third of the way, nearly
-    assert found[2, 3] > 0.83  # what differs much moves by a tenth of the way
-    torch.testing.assert_close(found[:, 4], observed[:, 4])
+    at = found[:, 3 + of].clone().requires_grad_(True)
+    pull = 0.25 * APART**2 * torch.log1p(((at - usual[:, of]) / APART).square()).sum()
+    assert torch.autograd.grad(0.5 * (at - observed[:, 3 + of]).square().sum() + pull, at)[0].abs().max() < 1e-4
+    assert at[0].item() == pytest.approx(0.3, abs=1e-5) and 0.31 < at[1] < 0.32  # a third of the way, nearly
+    assert at[2] > 0.83  # what differs much moves by a tenth of the way
+    torch.testing.assert_close(found[:, 4 - of], observed[:, 4 - of])
     torch.testing.assert_close(fitted(chain(like=5.0), observed), observed)
 
 
-def test_a_colour_has_the_roughness_that_most_of_its_texels_have():
-    """Random unknowns of red and blue texels, six of ten with one roughness per colour."""
+@pytest.mark.parametrize(("others", "is_metals"), [(1, True), (8, False)])
+def test_a_colour_has_the_gloss_of_most_of_its_texels(others, is_metals):
+    """Random unknowns of red and blue texels, most with one roughness and metallic per colour; in twenty of a metal's is one other."""
     unknowns = torch.rand(5000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
     red = torch.arange(5000) % 2 == 0
     unknowns[:, :3] = torch.where(red[:, None], torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.2, 0.8]))
-    same = torch.arange(5000) % 10 < 6
-    unknowns[same, 3] = torch.where(red[same], 0.1, 0.9)
+    same = torch.arange(5000) % 21 >= others
+    unknowns[same, 3:5] = torch.where(red[same, None], torch.tensor([0.1, 0.95]), torch.tensor([0.9, 0.05]))
     similar = SimilarTexels(unknowns, 0)
-    unknowns[:, :3] = 0.5  # what is similar was so at the start
-    torch.testing.assert_close(similar.usual_roughness(unknowns), torch.where(red, 0.1, 0.9))
-    assert torch.isfinite(SimilarTexels(unknowns, 0).usual_roughness(unknowns)).all()
+    unknowns[:, [0, 1, 2, 4]] = 0.5  # what is similar or metal was so at the start
+    expected = torch.stack([torch.where(red, 0.1, 0.9), torch.where(red & is_metals, 0.95, torch.nan)], dim=1)
+    torch.testing.assert_close(similar.usual_gloss(unknowns), expected, equal_nan=True)
 
 
 def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
@@ -101,9 +105,9 @@ def test_a_colour_counts_for_those_nearby_and_not_for_those_farther_away():
     unknowns[:, 3] = torch.where(few, 0.7, 0.2)
     for grey, roughness in ((0.50, 0.2), (0.1, 0.7)):
         unknowns[:, :3] = torch.where(few, grey, 0.55)[:, None]
-        assert (SimilarTexels(unknowns, 0).usual_roughness(unknowns)[few] == roughness).all()
+        assert (SimilarTexels(unknowns, 0).usual_gloss(unknowns)[few, 0] == roughness).all()
     weights = np.array([[1.0, 1.0, 1.0], [0.0, 5.0, 1.0], [9.0, 1.0, 1.0]])
-    assert weighted_medians(np.array([3.0, 1.0, 2.0]), weights).tolist() == [2.0, 1.0, 3.0]
+    assert weighted_quantiles(np.array([3.0, 1.0, 2.0]), weights, 0.5).tolist() == [2.0, 1.0, 3.0]
 
 
 def test_the_equations_find_what_linear_observations_say():
@@ -111,8 +115,7 @@ def test_the_equations_find_what_linear_observations_say():
     generator = torch.Generator().manual_seed(0)
     truth = torch.rand(6, N_UNKNOWNS, generator=generator)
     start = torch.zeros_like(truth)
-    prior = chain(m=6, smooth=1e-9, anchor=1e-9)
-    equations = NormalEquations(start, prior, 0.5)
+    equations = NormalEquations(start, chain(m=6, smooth=1e-9, anchor=1e-9), 0.5)
     texels = torch.arange(6).repeat(40).repeat_interleave(2)[:, None].expand(-1, 4)
     shares = torch.full((480, 4), 0.25)
     jacobian = torch.randn(240, 3, N_UNKNOWNS, generator=generator).repeat_interleave(2, 0)
@@ -127,14 +130,12 @@ def test_the_equations_find_what_linear_observations_say():
 
 
 def test_the_prior_takes_texels_along_that_no_photo_shows():
-    prior = chain(m=4, smooth=10.0, anchor=1e-6)
-    equations = NormalEquations(torch.zeros(4, N_UNKNOWNS), prior, 0.0)
+    equations = NormalEquations(torch.zeros(4, N_UNKNOWNS), chain(m=4, smooth=10.0, anchor=1e-6), 0.0)
     one = torch.eye(N_UNKNOWNS)
     jacobian = torch.stack([one[:3], one[3:6], one[4:]]).repeat_interleave(2, 0)
     texels, shares = torch.zeros(6, 4, dtype=torch.int64), torch.full((6, 4), 0.25)
     equations.add(texels, shares, jacobian, torch.ones(6, 3), -torch.ones(6, 3))
-    nothing = torch.zeros(4, N_UNKNOWNS)
-    step = equations.step(nothing, None, 200)
+    step = equations.step(torch.zeros(4, N_UNKNOWNS), None, 200)
     torch.testing.assert_close(step[:3], torch.ones(3, N_UNKNOWNS), atol=0.02, rtol=0)
     assert step[3].abs().max() < 1e-6
 
@@ -200,8 +201,7 @@ def test_the_lights_curvature_is_that_of_the_errors():
     start = torch.from_numpy(sky())
     truth = start * torch.exp(0.1 * torch.sin(torch.arange(32) / 5.0))[None, :, None]
     found = observed_light(truth, start, directions, n_steps=1, share=1.0)
-    way = (found / start).log()[2:-2]
-    asked = (truth / start).log()[2:-2]
+    way, asked = ((light / start).log()[2:-2] for light in (found, truth))
     assert 0.7 < (way * asked).sum() / asked.square().sum() < 1.05
 
 

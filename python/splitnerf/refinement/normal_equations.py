@@ -9,10 +9,10 @@ from torch import Tensor
 
 from splitnerf.refinement.conjugate_gradients import conjugate_gradients
 from splitnerf.refinement.texels import TexelPairs
-from splitnerf.refinement.unknowns import ROUGHNESS
+from splitnerf.refinement.unknowns import GLOSS
 
 EDGE = 0.05  # length of the differences between neighbours from which on they count as an edge
-APART = 0.3  # distance of the roughness to the usual one from which on that pulls less
+APART = 0.3  # distance of roughness or metallic to the usual one from which on that pulls less
 
 
 class Prior(NamedTuple):
@@ -25,7 +25,7 @@ class Prior(NamedTuple):
             that small differences are smoothed and edges are kept (Black and Anandan 1996).
         groups: Numbers of unknowns, in order, that have their edges in common.
         anchor: [n] weight of the distance to the start.
-        like: Weight of the distance d of the roughness to the usual one, whose cost is log(1 + (d / APART)^2).
+        like: [2] weights of the distances d of roughness and metallic to the usual ones; their cost is log(1 + (d / APART)^2).
     """
 
     pairs: TexelPairs
@@ -33,7 +33,7 @@ class Prior(NamedTuple):
     flat: Tensor
     groups: tuple[int, ...]
     anchor: Tensor
-    like: float
+    like: Tensor
 
     def flatness(self, unknowns: Tensor) -> Tensor:
         """[k, n] the weights by which squared differences have the gradient of their cost at unknowns [m, n]."""
@@ -51,10 +51,8 @@ class NormalEquations:
     Derivatives are estimates, and their squares hold the variance of their noise. That shortens the steps of unknowns
     that a photo determines poorly. (Scaled down to the products of a pixel's two rays, roughness and metallic drifted.)
 
-    Args:
-        start: [m, n] unknowns at the start.
-        keep: The share of the sums that is kept after a step, in [0, 1). They are carried to the new unknowns as if the
-            photos were linear functions of them.
+    `start` [m, n] are the unknowns at the start; `keep`, in [0, 1), is the share of the sums that is kept after a step. They are carried to the
+    new unknowns as if the photos were linear functions of them.
     """
 
     def __init__(self, start: Tensor, prior: Prior, keep: float):
@@ -63,15 +61,9 @@ class NormalEquations:
         self.gradient = torch.zeros_like(start)
 
     def add(self, texels: Tensor, shares: Tensor, jacobian: Tensor, weights: Tensor, residual: Tensor) -> None:
-        """Adds observations, b in all.
-
-        Args:
-            texels: [b, 4] int64 the texels around each point.
-            shares: [b, 4] bilinear.
-            jacobian: [b, 3, n] derivatives of the colours by the unknowns at the point.
-            weights: [b, 3] of the squared errors.
-            residual: [b, 3] predicted minus observed colours, its noise independent of the Jacobian's.
-        """
+        """Adds b observations: the texels [b, 4] around each point with their bilinear shares, the derivatives [b, 3, n] of its colours by the
+        unknowns there, the weights [b, 3] of the squared errors, and predicted minus observed colours [b, 3], whose noise is independent
+        of the derivatives'."""
         weighted = jacobian * weights[..., None]
         gradient = torch.einsum("bcn,bc->bn", weighted, residual)
         curvature = torch.einsum("bcn,bck->bnk", weighted, jacobian).flatten(1)
@@ -86,15 +78,16 @@ class NormalEquations:
     @torch.no_grad()
     def step(self, unknowns: Tensor, usual: Tensor | None, n_iterations: int = 20) -> Tensor:
         """The Gauss-Newton step [m, n] from unknowns [m, n]; the prior's costs by iteratively reweighted least squares (Nocedal and
-        Wright 2006, section 10.3). `usual` [m] is the roughness that texels are drawn to; None: to none."""
+        Wright 2006, section 10.3). `usual` [m, 2] are roughness and metallic that texels are drawn to; NaN or None: to none."""
         prior = self.prior
         typical = self.curvature.diagonal(dim1=1, dim2=2).mean(0)  # of each unknown
         flat = prior.flatness(unknowns) * typical
         smooth = flat + prior.smooth * typical
         anchor, unlike, pull = prior.anchor * typical, torch.zeros_like(unknowns), torch.zeros_like(unknowns)
         if usual is not None:
-            unlike[:, ROUGHNESS] = unknowns[:, ROUGHNESS] - usual
-            pull[:, ROUGHNESS] = prior.like * typical[ROUGHNESS] / (1.0 + (unlike[:, ROUGHNESS] / APART).square())
+            unlike[:, GLOSS] = torch.where(usual.isnan(), 0.0, unknowns[:, GLOSS] - usual)
+            weights = prior.like * typical[GLOSS] / (1.0 + (unlike[:, GLOSS] / APART).square())
+            pull[:, GLOSS] = torch.where(usual.isnan(), 0.0, weights)
         system = self.curvature + torch.diag_embed(anchor + pull + 1e-12)
         inverses = torch.linalg.inv(system + torch.diag_embed(prior.pairs.sums(smooth)))
         down = self.gradient + anchor * (unknowns - self.start) + pull * unlike + self._differences(unknowns, flat)

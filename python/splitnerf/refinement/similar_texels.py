@@ -1,4 +1,4 @@
-"""The usual roughness of texels of one colour: a prior for it where the photos determine it poorly."""
+"""The usual gloss of texels of one colour: a prior for roughness and metallic where the photos determine them poorly."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from scipy.cluster.vq import kmeans2, vq
 from scipy.spatial.distance import cdist
 from torch import Tensor
 
-from splitnerf.refinement.unknowns import ROUGHNESS
+from splitnerf.refinement.unknowns import METALLIC, ROUGHNESS
 
 N_KINDS = 24  # of texels, by their colour
 N_SEEN = 20000  # texels by which kinds and medians are found
 REACH = 0.15  # deviation of the colours that count as one
+METAL, FEW = 0.7, 0.1  # a metal's colour: at most this share of its texels has less metallic than that at the start
 
 
 class SimilarTexels:
-    """Texels of about one colour at the start of a fit, and the roughness that is usual among them. `start` [m, n] are the unknowns
-    before all steps, see :mod:`splitnerf.refinement.unknowns`; `seed` is of the texels by which kinds and medians are found."""
+    """Texels of about one colour at the start of a fit, and the gloss that is usual among them. Where a colour is a metal's, texels with less
+    are metal that mirrors little. `start` [m, n] are the unknowns before all steps, see :mod:`splitnerf.refinement.unknowns`; `seed` is of
+    the texels by which kinds and medians are found."""
 
     def __init__(self, start: Tensor, seed: int):
         random, colours = np.random.default_rng(seed), start[:, :3].double().numpy() / REACH
@@ -29,15 +31,19 @@ class SimilarTexels:
         # not by certainty: glossy texels would decide for all
         self._weights = np.exp((squared.min(1, keepdims=True) - squared) / 2)
         self._kind = vq(colours, centres)[0]
+        metallic = start[:, METALLIC].numpy()[self._seen]
+        least, middle = (weighted_quantiles(metallic, self._weights, share) for share in (FEW, 0.5))
+        self._metallic = np.where(least >= METAL, middle, np.float32(np.nan))
 
-    def usual_roughness(self, unknowns: Tensor) -> Tensor:
-        """[m] the weighted median of the roughness of the texels of each one's colour, whose unknowns [m, n] are given as they are now."""
-        medians = weighted_medians(unknowns[:, ROUGHNESS].numpy()[self._seen], self._weights)
-        return torch.from_numpy(medians[self._kind])
+    def usual_gloss(self, unknowns: Tensor) -> Tensor:
+        """[m, 2] the weighted median of the roughness of the texels of each one's colour, whose unknowns [m, n] are given as they are now,
+        and that of the metallic at the start, NaN where the colour is not a metal's."""
+        roughness = weighted_quantiles(unknowns[:, ROUGHNESS].numpy()[self._seen], self._weights, 0.5)
+        return torch.from_numpy(np.stack([roughness, self._metallic], axis=1)[self._kind])
 
 
-def weighted_medians(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """[k] the medians of values [n], one for each row of weights [k, n]; each row's sum is above 0."""
+def weighted_quantiles(values: np.ndarray, weights: np.ndarray, share: float) -> np.ndarray:
+    """[k] the quantiles of values [n], one for each row of weights [k, n]; each row's sum is above 0."""
     order = np.argsort(values)
     sums = np.cumsum(weights[:, order], axis=1)
-    return values[order][(sums < 0.5 * sums[:, -1:]).sum(axis=1)]
+    return values[order][(sums < share * sums[:, -1:]).sum(axis=1)]

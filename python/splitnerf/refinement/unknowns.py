@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 N_UNKNOWNS = 7  # albedo (3) to the power 1 / 2.2, roughness, metallic, x and y of the tangent-space normal
-ROUGHNESS, METALLIC = 3, 4  # their places among them
+ROUGHNESS, METALLIC, GLOSS = 3, 4, slice(3, 5)  # their places among them
 GROUPS = (3, 1, 1, 2)  # unknowns that have their edges in common
 GAMMA = 2.2  # equal steps of albedo^(1 / 2.2) look about equal
 MIN_ALBEDO, MIN_ROUGHNESS, MAX_TILT = 0.01, 0.03, 0.9
