@@ -86,7 +86,7 @@ def test_a_usual_roughness_or_metallic_pulls_at_the_cost_that_is_written(of):
 
 @pytest.mark.parametrize(("others", "is_metals"), [(1, True), (8, False)])
 def test_a_colour_has_the_gloss_of_most_of_its_texels(others, is_metals):
-    """Random unknowns of red and blue texels, most with one roughness and metallic per colour; in twenty of a metal's is one other."""
+    """Random unknowns of red and blue texels, most with one roughness and metallic per colour; few of a metal's differ."""
     unknowns = torch.rand(5000, N_UNKNOWNS, generator=torch.Generator().manual_seed(0))
     red = torch.arange(5000) % 2 == 0
     unknowns[:, :3] = torch.where(red[:, None], torch.tensor([0.9, 0.1, 0.1]), torch.tensor([0.1, 0.2, 0.8]))
