@@ -343,16 +343,6 @@ TEST(GroupKernels, QuadraticEntropy) {
     cpu::run(n, PairLikenessBody<double>{n, channels, x.data(), one.data()});
     on_gpu(n, PairLikenessBody<double>{n, channels, x.data(), lanes.data()});
     expect_near(lanes, one, 1e-13);
-    // E = -ln(sum k / n^2) and its gradient, from the rows of sums.
-    double entropy, total, expected = 0;
-    std::vector<double> gradient(n * channels);
-    for (int64_t i = 0; i < n; ++i) expected += one[i * (channels + 1) + channels];
-    cpu::run(n, EntropyBody<double>{n, channels, one.data(), &entropy, &total});
-    cpu::run(n * channels, EntropyGradientBody<double>{channels, one.data(), &total, gradient.data()});
-    EXPECT_NEAR(entropy, -std::log(expected / (n * n)), 1e-13);
-    for (int64_t i = 0; i < n; ++i)
-      for (int64_t c = 0; c < channels; ++c)
-        EXPECT_NEAR(gradient[i * channels + c], one[i * (channels + 1) + c] / expected, 1e-13);
   }
 }
 

@@ -351,8 +351,6 @@ MISFITS = {
     "a moment of another shape": (moments(exp_avg=torch.zeros(7)), {}),
     "no generator": (put(generator=torch.zeros(3, dtype=torch.uint8)), {}),
     "a damaged generator": (lambda c: c["torch_generator"].fill_(255), {}),
-    "settings of more levels": (lambda c: None, {"n_levels": 5}),
-    "settings of more cells": (lambda c: None, {"grid_resolution": 20}),
 }
 
 

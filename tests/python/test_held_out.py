@@ -138,6 +138,16 @@ def test_what_is_best_on_held_out_pixels_is_delivered(painted, monkeypatch, good
     assert (refined.held[1] < 0.3 * refined.held[0]) == bool(good)
 
 
+@pytest.mark.parametrize(("rise", "delivered"), [(1.3, 2), (1.5, 1)])
+def test_what_training_knew_of_held_out_photos_may_be_unlearnt(painted, rise, delivered):
+    """A rise of their errors that test views were seen not to share."""
+    asset, data = painted
+    stage = Stage(data, asset, sky(), SETTINGS)
+    held = 1.0 + stage.fit.held_errors()
+    stage.best, stage.last = stage._candidate(1, held), stage._candidate(2, rise * held)
+    assert stage.result().delivered == delivered
+
+
 @pytest.mark.parametrize("true", [False, True])
 def test_normals_that_explain_nothing_are_left_out(painted, true):
     """A relief that the photos show is kept; noise that they do not show is left out."""

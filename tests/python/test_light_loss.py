@@ -155,6 +155,7 @@ def test_rays_that_meet_nothing_cost_nothing():
         losses.material_entropy_loss(ray, tiny(), generator()),
         losses.occlusion_loss(ray, None, None, tiny(), generator(), 0),
         losses.occlusion_loss(occlusion_rays(9), None, None, tiny(occlusion_share=0.0), generator(), 0),
+        *losses.material_losses(torch.zeros(0, 3), torch.zeros(0, 1), torch.zeros(0)),
     ):
         assert loss.shape == () and loss.item() == 0.0
 
@@ -262,14 +263,3 @@ def test_material_entropy_counts_materials():
     apart = -math.log(0.5 + 0.5 * math.exp(-0.25 * (0.8 / 0.2) ** 2))
     assert entropy([0.2, 0.2], roughness=[0.1, 0.9]) == pytest.approx(apart, abs=0.01)
     assert entropy([0.02, 0.9], weights=[1.0, 0.0]) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_metals_by_hand():
-    """Eq. (18); dark metals, but neither bright ones nor dielectrics; nothing costs nothing."""
-    metallic, shares = torch.tensor([[1.0], [0.4]]), torch.tensor([0.5, 0.25])
-    metal, _ = losses.material_losses(torch.ones(2, 3), metallic, shares)
-    assert metal.item() == pytest.approx((0.5 + 0.25 * 0.16) / 0.75)
-    albedo = torch.tensor([[0.1, 0.2, 0.0], [0.5, 0.1, 0.1], [0.01, 0.01, 0.01]])
-    dark = losses.material_losses(albedo, torch.tensor([[1.0], [1.0], [0.0]]), torch.ones(3))[1]
-    assert dark.item() == pytest.approx((1 - 0.2 / 0.4) / 3)
-    assert not losses.material_losses(torch.zeros(0, 3), torch.zeros(0, 1), torch.zeros(0)).any()

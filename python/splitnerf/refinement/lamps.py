@@ -1,13 +1,5 @@
-"""A lamp that training smeared is made compact again.
-
-Training's light is smooth. A sun comes out as a lobe of tens of degrees, whose shadows have no edges, so the albedo
-takes the edges of the sun's shadow. Light and albedo together then explain the photos, and no further step separates
-them. But the true albedo does not depend on shadows: of two close points, one in the shadow of a part of the lobe and
-one outside it, it is the same on average over many pairs. If the lobe stands for a compact lamp, the albedo outside the
-shadow is instead brighter by what the lamp adds there. So the lamp's direction, width and power are those that leave
-the smallest contrasts between such points. Where glossy texels have mirrored the light, its direction is that of the
-lobe, and the rest of the light stays; else the power of all light does, unless photos show what else shines on the
-object. What scatters gets darker by what the lamp adds.
+"""A lamp that training smeared is made compact again: by the edges of its shadows in the albedo, or by its mirror images; docs/method.md,
+"A smeared lamp", has the reasons.
 """
 
 from __future__ import annotations

@@ -1,13 +1,5 @@
-"""The level of the light, by what dielectrics reflect, and its tint, by metals.
-
-Photos fix the products of light and reflectance. Under a light that is too dark by a factor, each dielectric reflects more
-than the DIELECTRIC share that it must at normal incidence: training makes it a faint or a dark metal. No metal is that
-dark (Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2), so the reflectance on which most of what is no metal
-agrees tells the factor. Only glossy surfaces tell it: the lobe of a rough metal looks like what clay scatters.
-
-Training takes light for grey, and gives the light's tint to the metal that mirrors it. But steel, chromium, aluminium and silver
-are grey, and of the others in that table only nickel, titanium and platinum are nearly so: much metal of one faint colour is
-grey metal in a light of that colour.
+"""The level of the light, by what dielectrics reflect, and its tint, by metals; docs/method.md, "The level of the light", has the reasons.
+Metals: Akenine-Moller et al., Real-Time Rendering, 4th ed., table 9.2.
 """
 
 from __future__ import annotations

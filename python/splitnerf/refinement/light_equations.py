@@ -1,10 +1,5 @@
-"""Gauss-Newton steps of the light: equations from the photos, and a prior that makes it as smooth and grey as they
-allow.
-
-A pixel is a linear function of the light. The gradient comes from all pixels; the curvature from some of them and from
-a bound of its whole, without which steps are far too long where few of them see the light (Levenberg 1944; Marquardt
-1963). The unknowns are the levels of log radiance. Each of a finer level's texels is expected to be near zero, in
-colour nearer than in brightness, and with heavy tails, as windows and lamps have edges.
+"""Gauss-Newton steps of the light: equations from the photos, and a prior that makes it as smooth and grey as they allow. A pixel is a
+linear function of the light, whose unknowns are the levels of log radiance. Bounded curvature: Levenberg 1944; Marquardt 1963.
 """
 
 from __future__ import annotations

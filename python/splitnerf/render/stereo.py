@@ -1,10 +1,4 @@
-"""Depth from photos alone: each photo's pixels are compared with its neighbours' at many depths.
-
-A distance field moves where colours change nearby. If a cavity starts filled, the field cannot open it: the lid is far
-from the floor, so no gradient points inwards. Stereo compares all depths at once, and needs neither materials nor
-light. Windows that follow a surface found before show its depth several times more precisely than windows that face the
-camera.
-"""
+"""Depth from photos alone, without materials and light: each photo's pixels are compared with its neighbours' at many depths."""
 
 from __future__ import annotations
 
