@@ -12,7 +12,7 @@ from gltf_builder import Gltf
 from painted_ball import bare
 from PIL import Image
 from splitnerf.cli import DONE, INTERRUPTED, main
-from splitnerf.data.environment import directions_of_texels, rotate_environment
+from splitnerf.data.environment import directions_of_texels
 from splitnerf.data.gltf import read_asset
 from splitnerf.data.images import linear_to_srgb, read_image, straight_srgb, write_image
 from splitnerf.errors import InputError
