@@ -19,12 +19,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "licences.md"
 EXTRAS = ("photos", "heic", "raw", "video", "bench", "usd", "blender", "batch", "tensorboard")
 SHORT = 40  # characters of a licence's name; longer is its text
 # What the first licence in a text begins with; a BSD licence is told by what follows within FAR characters.
-MIT, BSD, THIRD_CLAUSE, FAR = (
-    "Permission is hereby granted, free of charge",
-    "Redistribution and use in source",
-    "Neither the name",
-    1500,
-)
+MIT, BSD, THIRD_CLAUSE, FAR = "Permission is hereby granted, free of charge", "Redistribution and use in source", "Neither the name", 1500
 HEAD = """# Licences
 
 SplitNeRF is under the MIT licence. A wheel carries Embree and oneTBB (Apache-2.0), and three.js and uPlot (MIT) in the page of
@@ -46,14 +41,8 @@ def licence(package: metadata.Distribution) -> str:
     if named:
         return ", ".join(named)
     texts = [fields.get("License") or ""]
-    texts += [
-        f.locate().read_text(errors="replace")
-        for f in package.files or []
-        if re.search("licen[cs]e", f.name, re.IGNORECASE)
-    ]
-    return next(
-        (f"{name}, by its text" for text in texts if (name := licence_of_text(" ".join(text.split())))), "not stated"
-    )
+    texts += [f.locate().read_text(errors="replace") for f in package.files or [] if re.search("licen[cs]e", f.name, re.IGNORECASE)]
+    return next((f"{name}, by its text" for text in texts if (name := licence_of_text(" ".join(text.split())))), "not stated")
 
 
 def licence_of_text(text: str) -> str:
