@@ -4,7 +4,7 @@
 
 RUN is a finished training of DATA. The steps are those near its end. The operators must pass `splitnerf doctor`'s test with each
 instruction set before anything is timed. Beside them stands the same step in plain torch: the same samples, and every operator that
-tests/reference.py has in that form, as it is or through torch.compile.
+tests/reference.py has in that form.
 """
 
 import argparse
@@ -23,7 +23,6 @@ OTHERS = {  # what keeps torch to an instruction set, too
     "avx2": {"ATEN_CPU_CAPABILITY": "avx2", "MKL_ENABLE_INSTRUCTIONS": "AVX2", "ONEDNN_MAX_CPU_ISA": "AVX2"},
     "avx512": {},
 }
-FORMS = {"plain": "the same step in plain torch, ms", "compiled": "and with its operators through torch.compile, ms"}
 LATE = 0.9  # the progress of the timed steps
 LEAST = 0.3  # ms, below which an operator is counted with the others
 # Arguments of which operators read what they need at random; the others are read once, from end to end.
@@ -37,15 +36,13 @@ SOURCES = tuple(f"cpp/{name}" for name in ("src", "include", "torch"))
 SOURCES += tuple(f"python/splitnerf/{name}" for name in ("training", "render", "fields"))
 
 
-def use_plain_torch(compiled: bool) -> None:
-    """From here on the operators that tests/reference.py has are its functions, each compiled or as it is."""
+def use_plain_torch() -> None:
+    """From here on the operators that tests/reference.py has are its functions."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     import reference
     import torch
-    import torch._functorch.config
     from splitnerf.ops import light, rays, sdf, shading, training, visibility
 
-    torch._functorch.config.donated_buffer = False  # gradients of gradients go through a backward pass twice
     in_form = {  # where an operator returns its terms in one tensor, or what its backward pass reads as well
         "sdf_field": lambda *inputs: reference.sdf_field(*inputs[:-1]),
         "pixel_losses": lambda *inputs: torch.stack(reference.pixel_losses(*inputs)),
@@ -55,17 +52,14 @@ def use_plain_torch(compiled: bool) -> None:
 
     class Plain:
         def __getattr__(self, name: str):
-            form = in_form.get(name) or getattr(reference, name, None)
-            found = form and compiled and torch.compile(form) or form or getattr(torch.ops.splitnerf, name)
-            setattr(self, name, found)
-            return found
+            return in_form.get(name) or getattr(reference, name, None) or getattr(torch.ops.splitnerf, name)
 
     for module in (light, rays, sdf, shading, training, visibility):
         module.lib = Plain()
 
 
-def measured(run: Path, data: Path, n_steps: int, form: str | None) -> dict:
-    """Times and counts of this process's steps: ms a step, then for each operator ms, calls and bytes a step; of a step in one of FORMS the
+def measured(run: Path, data: Path, n_steps: int, plain: bool) -> dict:
+    """Times and counts of this process's steps: ms a step, then for each operator ms, calls and bytes a step; of a step in plain torch the
     time alone."""
     import torch
     from splitnerf.pipeline import load_splits
@@ -119,9 +113,9 @@ def measured(run: Path, data: Path, n_steps: int, form: str | None) -> dict:
                 training.advance(Silent())
             return 1e3 * (time.perf_counter() - began) / n
 
-        if form:
-            use_plain_torch(form == "compiled")
-            steps(16 if form == "compiled" else 4)
+        if plain:
+            use_plain_torch()
+            steps(4)
             return {"wall": sorted(steps(4) for _ in range(5))[2]}
         steps(20)
         wall = sorted(steps(n_steps // 5) for _ in range(5))[2]
@@ -174,19 +168,10 @@ def _timed(body) -> float:
     return time.perf_counter() - began
 
 
-def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int, form: str | None = None) -> dict | None:
+def asked(run: Path, data: Path, n_steps: int, isa: str, threads: int, plain: bool = False) -> dict | None:
     """What a process of its own measures; None where the processor has no such instruction set."""
     environment = os.environ | OTHERS[isa] | {"SPLITNERF_ISA": isa, "OMP_NUM_THREADS": str(threads)}
-    words = [
-        sys.executable,
-        __file__,
-        run,
-        data,
-        "--steps",
-        str(n_steps),
-        "--measure",
-        *(["--form", form] if form else []),
-    ]
+    words = [sys.executable, __file__, run, data, "--steps", str(n_steps), "--measure", *["--plain"] * plain]
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"{isa}, {threads} threads: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
@@ -202,7 +187,7 @@ def page(cases: dict[tuple[str, int], dict], head: str) -> str:
     lines += ["|---|" + "---|" * len(cases)]
     rows = {
         "wall": "a step, ms",
-        **FORMS,
+        "plain": "the same step in plain torch, ms",
         "copy": "copying 8 MB, GB/s",
         "gathers": "random reads of 8 bytes from 1 MB, 10^9 a second",
         "flops": "a matrix product, GFLOP/s",
@@ -255,17 +240,17 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/step.md"))
     parser.add_argument("--measure", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--form", choices=FORMS, help=argparse.SUPPRESS)
+    parser.add_argument("--plain", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.measure:
-        print(json.dumps(measured(args.run, args.data, args.steps, args.form)))
+        print(json.dumps(measured(args.run, args.data, args.steps, args.plain)))
         return
     from splitnerf_tools.bench.provenance import header, provenance
 
     inputs = args.run, args.data, args.steps
     cases = {case: found for case in CASES if (found := asked(*inputs, *case)) is not None}
     for case, found in cases.items():
-        found |= {form: asked(*inputs, *case, form)["wall"] for form in FORMS}
+        found["plain"] = asked(*inputs, *case, plain=True)["wall"]
     facts = provenance(SOURCES, f"python tests/bench/step.py {args.run.name} {args.data.name}")
     del facts["threads"], facts["kernels"]
     args.out.write_text(page(cases, header(facts)))
