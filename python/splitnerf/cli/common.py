@@ -209,6 +209,11 @@ def print_refinement(summary: dict | None) -> None:
     if summary["outline_error"]:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
     print(f"refinement, on the photos: {', '.join(changes)}, at step {summary['steps']}, {summary['seconds']:.0f} s")
+    before, after = summary["held_out_psnr"]
+    if after < before and summary["delivered"]:
+        print(
+            "photos held out lose what training had fitted in them; new views of objects with truth lost nothing by that"
+        )
     if summary["lamp"]:
         print("a lamp that training had smeared was made compact first; photos do not tell which of the two it was")
     if summary["level"] != 1:
