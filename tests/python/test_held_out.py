@@ -140,7 +140,6 @@ def test_what_is_best_on_held_out_pixels_is_delivered(painted, monkeypatch, good
 
 @pytest.mark.parametrize(("rise", "delivered"), [(1.3, 2), (1.5, 1)])
 def test_what_training_knew_of_held_out_photos_may_be_unlearnt(painted, rise, delivered):
-    """A rise of their errors that test views were seen not to share."""
     asset, data = painted
     stage = Stage(data, asset, sky(), SETTINGS)
     held = 1.0 + stage.fit.held_errors()

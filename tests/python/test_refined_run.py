@@ -423,7 +423,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
     for changes, told in (
         ({}, f"{after:.2f} dB"),
         ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),
-        ({"held_out_psnr": [30.0, 29.0]}, "photos held out lose what training had fitted"),
+        ({"held_out_psnr": [30.0, 29.0], "lamp": None}, "photos held out lose what training had fitted"),
         ({"level": 1.1}, "the light was made 1.10 times as bright"),
         ({"tint": [1.25, 1.0, 0.8]}, "red, green, blue are multiplied by 1.25, 1.00, 0.80"),
     ):

@@ -232,12 +232,13 @@ def test_what_files_cannot_hold_is_bounded(tmp_path):
 
 
 def test_each_frame_is_rendered_as_it_is_set(tmp_path, ball, monkeypatch):
-    """With a seed and a turn of the light of its own, and the ground a millionth of the size below the ball."""
-    asked, light = [], np.zeros((16, 32, 3), np.float32)
+    """With a seed and a turn of the light of its own, from one place, and the ground a millionth of the size below the ball."""
+    asked, poses, light = [], set(), np.zeros((16, 32, 3), np.float32)
     light[5, 12] = 1.0
 
     def render(environment, pose, lens, width, height, **options):
         asked.append((environment.sum(axis=2).argmax() % 32, options))
+        poses.add(pose.tobytes())
         return {name: np.zeros((height, width, 3)[:n], np.float32) for name, n in (("radiance", 3), ("alpha", 2))}
 
     monkeypatch.setattr(rendering, "AssetRenderer", lambda asset: SimpleNamespace(render=render))
@@ -246,7 +247,7 @@ def test_each_frame_is_rendered_as_it_is_set(tmp_path, ball, monkeypatch):
     assert run(ball, "--env", tmp_path / "lamp.exr", *words, "--out", tmp_path / "out") == DONE
     # Counter-clockwise from above is to the left, by a quarter of 32 columns and then by one more from frame to frame.
     frame = {"spp": 3, "bounces": 2, "catcher_height": pytest.approx(0.3 - 1e-6 * 0.5, abs=2e-7)}
-    assert asked == [(column, frame | {"seed": 7 + i}) for i, column in enumerate((4, 28, 20, 12))]
+    assert asked == [(x, frame | {"seed": 7 + i}) for i, x in enumerate((4, 28, 20, 12))] and len(poses) == 1
 
 
 def test_mp4_or_the_package_that_is_missing(tmp_path, ball, grey, monkeypatch, capsys):

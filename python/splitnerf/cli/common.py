@@ -210,7 +210,7 @@ def print_refinement(summary: dict | None) -> None:
         changes.append("coverage at the outline, squared error {:.2g} -> {:.2g}".format(*summary["outline_error"]))
     print(f"refinement, on the photos: {', '.join(changes)}, at step {summary['steps']}, {summary['seconds']:.0f} s")
     before, after = summary["held_out_psnr"]
-    if after < before and summary["delivered"]:
+    if after < before and summary["delivered"] and not summary["lamp"]:
         print(
             "photos held out lose what training had fitted in them; new views of objects with truth lost nothing by that"
         )
