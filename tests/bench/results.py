@@ -63,8 +63,7 @@ SCORES = {  # column: the evaluation's keys, digits
     "steps": (("training", "step"), 0),
     "ms a step": (("training", "ms"), 1),
 }
-SKIPS = {  # what a step leaves out, with the settings that have it done; and the hull's cells, which it samples in any case at first
-    "all cells of the hull at first": ("hull_until=0",),
+SKIPS = {  # what a step leaves out, with the settings that have it done
     "faint samples": ("sampling.min_weight=0",),
     "every other sample": ("step_scale=1", "min_step=0.005"),
     "shading of most samples": ("shades_per_ray=0",),

@@ -173,6 +173,19 @@ def test_decimation_parts_what_touches_and_drops_sheets_without_volume(monkeypat
     np.testing.assert_array_equal(points[faces], vertices[np.concatenate([TETRAHEDRON, other])])
 
 
+@pytest.mark.parametrize("left", [[60, 30], [60, 60]])
+def test_decimation_tries_again_where_many_faces_are_left_and_says_so(left, monkeypatch, capsys):
+    """Tetrahedra apart, of which 30 are asked for."""
+    faces = (4 * np.arange(60)[:, None, None] + TETRAHEDRON).reshape(-1, 3)
+    vertices = np.random.default_rng(0).normal(size=(240, 3)).astype(np.float32)
+    counts = iter(left + [60] * 7)
+    monkeypatch.setattr(
+        simplify.fast_simplification, "simplify", lambda *_, **__: (vertices, faces[: 4 * next(counts)])
+    )
+    assert len(decimate(vertices, np.concatenate([faces, faces]), 120)[1]) == 4 * min(left)
+    assert ("keeps 240 faces where 120 were asked for" in capsys.readouterr().err) == (min(left) == 60)
+
+
 # ---- what photos show ----
 
 

@@ -69,12 +69,10 @@ def refreshed(data, tmp_path, monkeypatch):
     return run
 
 
-def test_cells_are_brought_up_to_date_every_few_steps_and_the_hull_counts_at_first(refreshed):
-    """Every 6 steps, all cells at first and at the end; the hull until 0.4 of the run, which is step 8."""
-    trained, seen = refreshed(grid_every=6, hull_until=0.4)
-    expected = [(step, {"first": step == 0, "step": step, "use_hull": step < 8}) for step in range(0, 20, 6)]
-    assert seen["grid"] == [*expected, (19, {})]
-    assert 0 < trained.grid.hull.float().mean() < 0.6
+def test_cells_are_brought_up_to_date_every_few_steps(refreshed):
+    """Every 6 steps, all cells at first and at the end."""
+    _, seen = refreshed(grid_every=6)
+    assert seen["grid"] == [*((step, {"first": step == 0, "step": step}) for step in range(0, 20, 6)), (19, {})]
 
 
 def test_a_mesh_is_shaded_and_lit_anew_every_few_steps(data, tmp_path, monkeypatch):
@@ -316,12 +314,12 @@ def test_rays_are_drawn_near_the_masks_as_often_as_is_set(data, tmp_path):
 
 
 def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
-    training = loop.Training(load_dataset(data), tiny(box=1.2, hull_until=0.1), tmp_path, torch.device("cpu"))
-    cameras = training.source.possible, training.source.poses, training.source.intrinsics
-    hull = training.grid.hull.flatten()
-    assert torch.equal(hull, visual_hull(16, 1.2, *cameras).flatten())
-    assert not torch.equal(hull, visual_hull(16, 1.5, *cameras).flatten())
-    assert not loop.Training(load_dataset(data), tiny(hull_until=0.0), tmp_path, torch.device("cpu")).grid.hull
+    config = tiny(box=1.2)
+    source = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu")).source
+    cameras, hull = (source.possible, source.poses, source.intrinsics), source.hull(config)
+    assert 0 < hull.float().mean() < 0.6
+    assert torch.equal(hull, visual_hull(16, 1.2, *cameras))
+    assert not torch.equal(hull, visual_hull(16, 1.5, *cameras))
 
 
 # ---- the surface as a mesh, made at once or beside the training ----

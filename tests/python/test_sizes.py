@@ -111,7 +111,8 @@ def test_rays_are_drawn_within_the_photos_through_their_own_lenses(mixed):
 
 def test_the_hull_is_that_of_the_whole_photos(square, mixed, tmp_path):
     """What lies beside a photo says nothing: only by the box's corners less is carved."""
-    grids = [Training(load_dataset(root), tiny(), tmp_path, torch.device("cpu")).grid.hull for root in (square, mixed)]
+    cpu = torch.device("cpu")
+    grids = [Training(load_dataset(root), tiny(), tmp_path, cpu).source.hull(tiny()) for root in (square, mixed)]
     assert (grids[0] & ~grids[1]).sum() == 0  # nothing more is carved
     axis = torch.linspace(-1, 1, 2 * len(grids[0]) + 1)[1::2] * tiny().constants.box
     near = axis[:, None, None] ** 2 + axis[None, :, None] ** 2 + axis**2 < 1.3**2

@@ -83,7 +83,7 @@ def test_torch_adds_in_a_fixed_order_where_asked():
 
 
 # Runs by what decides their steps to come. One cell is always near the surface: the grid is the same.
-ONE_CELL = {"grid_resolution": 1, "hull_until": 0.0, "mesh_every": 0.25}
+ONE_CELL = {"grid_resolution": 1, "mesh_every": 0.25}
 MLP_LIGHT = ONE_CELL | {"light.kind": "mlp", "shading.method": "split", "occlusion.kind": "off", "light_samples": 256}
 RESUMED = {
     "a convex surface": ONE_CELL | {"open_below": 0.0, "grid_every": 8},

@@ -255,18 +255,6 @@ def test_the_hull_is_what_every_mask_that_sees_it_allows():
     assert near.any() and hull[near].all()
 
 
-@pytest.mark.parametrize("name", ["cpu", "paper"])
-def test_a_hull_holds_its_cells_while_it_is_used(name):
-    """Whatever the field says: here that nothing is there."""
-    hull = torch.zeros(16, 16, 16, dtype=torch.bool)
-    hull[3, 5, 7] = True
-    grid = make_grid(preset(name).replace({"grid_resolution": 16}), hull)
-    for use_hull in (True, False, True):
-        grid.update(lambda x: torch.full_like(x[:, 0], 9.0), 100.0, use_hull=use_hull)
-        assert torch.equal(grid.cells == CELL_OCCUPIED, hull & use_hull)
-        assert (grid.cells[~hull] == CELL_EMPTY).all()
-
-
 def test_cells_far_from_the_surface_are_asked_now_and_then_and_near_ones_always():
     asked = []
 

@@ -302,7 +302,6 @@ class Constants:
     min_transmittance: float = number(1e-3, below=1.0)  # at which a ray ends
     shades_per_ray: int = number(4, at_most=1024)  # the other samples interpolate; 0 shades all
     grid_every: int = number(32, at_least=1)  # steps between refreshes of the occupancy grid
-    hull_until: float = number(0.1)  # before, the masks' visual hull is sampled
     foreground_share: float = number(0.85)  # of the rays, drawn near the masks
     # losses
     shape_priors_until: float = number(0.7)  # share of the run; later the photos alone move the surface

@@ -58,7 +58,6 @@ PAPER = dict(
         min_transmittance=0.0,
         shades_per_ray=0,
         grid_every=16,
-        hull_until=0.0,
         foreground_share=0.0,
         shape_priors_until=1.0,
         light_form="square",

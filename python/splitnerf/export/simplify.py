@@ -13,11 +13,14 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from trimesh.graph import connected_component_labels
 
+from splitnerf.errors import note_once
+
 MIN_COMPONENT = 0.01  # share of the largest component's faces
 LEAST_SEEN = 0.1  # share of a component's vertices that photos must show
 FOLDED = 0.2  # share of its area that what no photo shows keeps at least on a membrane
 # The quadric simplification sometimes pinches thin parts; then another aggressiveness or target is tried.
 AGGRESSIVENESS, SHARES = (5, 3, 7), (1.0, 0.97, 0.94)
+MANY = 1.1  # times the number of faces that is asked for
 
 
 def drop_floaters_and_cavities(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -94,19 +97,23 @@ def is_closed(faces: np.ndarray) -> bool:
 
 def decimate(vertices: np.ndarray, faces: np.ndarray, n_faces: int) -> tuple[np.ndarray, np.ndarray]:
     """Collapses edges by quadric error until about n_faces are left: vertices [k, 3] float32 and faces [l, 3] int32. Tries several
-    ways to keep a closed mesh closed. A number of 0, or not below that of the faces, keeps all. Source: Garland and Heckbert,
-    "Surface Simplification Using Quadric Error Metrics" (1997)."""
+    ways to keep a closed mesh closed, and notes where folds leave many more. A number of 0, or not below that of the faces, keeps
+    all. Source: Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997)."""
     vertices, faces = vertices.astype(np.float32), faces.astype(np.int32)
     if n_faces == 0 or n_faces >= len(faces):
         return vertices, faces
-    closed = is_closed(faces)
+    closed, least = is_closed(faces), (True, True)
     for share, aggressiveness in product(SHARES, AGGRESSIVENESS):
         light = fast_simplification.simplify(vertices, faces, target_count=int(share * n_faces), agg=aggressiveness)
         _, group, count = np.unique(np.sort(light[1], axis=1), axis=0, return_inverse=True, return_counts=True)
         single = light[1][count[group.reshape(-1)] == 1]  # two faces of the same vertices are a sheet without volume
-        result = split_pinches(*_compact(light[0].astype(np.float32), single))
-        if not closed or is_closed(result[1]):
+        found = split_pinches(*_compact(light[0].astype(np.float32), single))
+        if (faults := (closed and not is_closed(found[1]), len(found[1]) > MANY * n_faces)) <= least:
+            result, least = found, faults
+        if not any(faults):
             break
+    if least[1]:
+        note_once(f"the mesh keeps {len(result[1])} faces where {n_faces} were asked for, as its folds let no more go")
     return result
 
 

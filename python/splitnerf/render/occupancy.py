@@ -28,12 +28,10 @@ class OccupancyGrid:
 
     With |grad f| <= L, a cell of half diagonal h contains no point with |f| < cutoff/s if |f(centre)| > L h +
     cutoff/s. Outside the surface such a cell is empty, inside it is opaque (transmittance below e^-cutoff).
-    An update with ``use_hull`` keeps the cells of the visual hull occupied, for any values of the field.
 
     Args:
         resolution: Cells along an edge, r.
         box: Half size of the cube, scene units.
-        hull: [r, r, r] bool, the visual hull, or None.
         device: The device of the cells and of the points at which the field is evaluated.
 
     Attributes:
@@ -42,8 +40,8 @@ class OccupancyGrid:
         cells: [r, r, r] uint8 over [x, y, z]: CELL_EMPTY, CELL_OCCUPIED or CELL_OPAQUE.
     """
 
-    def __init__(self, resolution: int, box: float, hull: Tensor | None = None, device: torch.device | str = "cpu"):
-        self.resolution, self.box, self.hull, self.device = resolution, box, hull, device
+    def __init__(self, resolution: int, box: float, device: torch.device | str = "cpu"):
+        self.resolution, self.box, self.device = resolution, box, device
         self.half_diagonal = math.sqrt(3.0) * box / resolution
         self.values = torch.zeros(resolution**3, device=device)
         self.cells = torch.full((resolution,) * 3, CELL_OCCUPIED, dtype=torch.uint8, device=device)
@@ -56,16 +54,13 @@ class OccupancyGrid:
         return torch.stack(torch.meshgrid(axis, axis, axis, indexing="ij"), dim=-1).reshape(-1, 3)
 
     @torch.no_grad()
-    def update(
-        self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
-    ) -> None:
+    def update(self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0) -> None:
         """Evaluates the field again and classes all cells.
 
         Args:
             sdf: A function from points [n, 3] to signed distances [n], scene units.
             s: Sharpness of the NeuS density, positive.
             first: Whether to evaluate all cells; otherwise the cells near the surface and a random share of all cells.
-            use_hull: Whether the cells of the visual hull stay occupied.
         """
         bound = LIPSCHITZ * self.half_diagonal + DENSITY_CUTOFF / s
         if first:
@@ -78,7 +73,7 @@ class OccupancyGrid:
         cells = torch.full_like(self.values, CELL_OCCUPIED, dtype=torch.uint8)
         cells[self.values > bound] = CELL_EMPTY
         cells[self.values < -bound] = CELL_OPAQUE
-        self._set(cells, use_hull)
+        self.cells = cells.view((self.resolution,) * 3)
 
     def _due(self, near: Tensor, share: float) -> Tensor:
         """The cells of a mask, and a random share of all. On a GPU the host waits for no count: the last update has
@@ -90,27 +85,18 @@ class OccupancyGrid:
         anywhere = torch.randint(len(near), (int(share * len(near)),), device=near.device)
         return torch.cat([torch.nonzero_static(near, size=int(count))[:, 0].clamp(min=0), anywhere])
 
-    def _set(self, cells: Tensor, use_hull: bool) -> None:
-        if use_hull and self.hull is not None:
-            cells[self.hull.reshape(-1)] = CELL_OCCUPIED
-        self.cells = cells.view((self.resolution,) * 3)
-
 
 class AveragedGrid(OccupancyGrid):
     """The released code's grid: a cell is occupied while the decaying maximum of its opacity, that of one sample whose ray meets
     the surface head-on, exceeds min(mean, 0.001). It gives no guarantee: a cell may become empty when its random point misses a
     thin part. Source: Instant NGP (Mueller et al. 2022), as nerfacc, which SplitNeRF's released code uses, describes it."""
 
-    def __init__(
-        self, resolution: int, box: float, step: float, hull: Tensor | None = None, device: torch.device | str = "cpu"
-    ):
-        super().__init__(resolution, box, hull, device)
+    def __init__(self, resolution: int, box: float, step: float, device: torch.device | str = "cpu"):
+        super().__init__(resolution, box, device)
         self.step = step
 
     @torch.no_grad()
-    def update(
-        self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0, use_hull: bool = False
-    ) -> None:
+    def update(self, sdf: Callable[[Tensor], Tensor], s: float, *, first: bool = True, step: int = 0) -> None:
         """Evaluates all cells in the first 256 steps; later a random quarter of all, and as many of the occupied
         ones."""
         n = len(self.values)
@@ -126,15 +112,16 @@ class AveragedGrid(OccupancyGrid):
         opacity = -torch.expm1(logsigmoid(s * (f - half)) - logsigmoid(s * (f + half)))
         self.values[due] = torch.maximum(DECAY * self.values[due], opacity)
         threshold = min(float(self.values.mean()), MIN_CELL_OPACITY)
-        self._set(torch.where(self.values > threshold, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8), use_hull)
+        cells = torch.where(self.values > threshold, CELL_OCCUPIED, CELL_EMPTY).to(torch.uint8)
+        self.cells = cells.view((self.resolution,) * 3)
 
 
-def make_grid(config: Config, hull: Tensor | None = None, device: torch.device | str = "cpu") -> OccupancyGrid:
+def make_grid(config: Config, device: torch.device | str = "cpu") -> OccupancyGrid:
     """The grid that the setting ``occupancy`` names."""
     resolution, c = config.sampling.grid_resolution, config.constants
     if config.sampling.occupancy == "average":
-        return AveragedGrid(resolution, c.box, c.min_step, hull, device)
-    return OccupancyGrid(resolution, c.box, hull, device)
+        return AveragedGrid(resolution, c.box, c.min_step, device)
+    return OccupancyGrid(resolution, c.box, device)
 
 
 def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:

@@ -80,8 +80,7 @@ class Training:
         self.exposures = PhotoExposures(dataset, c, device)
         self.model = SceneModel(c).to(device)
         self.optimiser = make_optimiser(self.model, c)
-        needs_hull = c.constants.hull_until > 0 or c.surface.start == "stereo"
-        self.grid = make_grid(c, self.source.hull(c) if needs_hull else None, device)
+        self.grid = make_grid(c, device)
         self.mesh = SurfaceMesh(self.model, background=c.mesh.background)
         self.model.use_turns(self.source.turns)
         is_seen = dataset.surroundings is not None and self.source.turns is None
@@ -162,8 +161,7 @@ class Training:
         set_learning_rate(self.optimiser, c, step, progress)
         if step % c.constants.grid_every == 0:
             s = model.s_value if self.take_step.s is None else self.take_step.s
-            use_hull = progress < c.constants.hull_until
-            self.grid.update(model.sdf_field.sdf, s, first=step == 0, step=step, use_hull=use_hull)
+            self.grid.update(model.sdf_field.sdf, s, first=step == 0, step=step)
         if c.occlusion.kind != "off" and progress - self.mesh.asked_at >= c.mesh.every:
             check_state(step, model, self.optimiser)
             self.mesh.request(progress)
@@ -251,7 +249,7 @@ def begun(
     elif c.surface.start == "stereo" and not 0 < c.training_minutes < COMPARED_FROM:
         note_once("the photos are compared to find a first shape")
         with same_bits(c.run.deterministic):
-            shape = start_shape(training.photos, training.grid.hull, c)
+            shape = start_shape(training.photos, training.source.hull(c), c)
             if shape is not None and shape.is_sure:
                 training.start_from(shape)
             elif shape is not None:
