@@ -6,14 +6,13 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import trimesh
-from blender_data import ANGLE, SIZE, edit, make_blender, set_pose, sphere_alpha
+from blender_data import SIZE, edit, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, FOCAL, LENS, RADIUS, sphere_poses, write_colmap, write_neus, write_transforms
 from splitnerf.cli import BAD_INPUT, DONE
 from splitnerf.config import Config
 from splitnerf.data.dataset import load_dataset
 from splitnerf.data.frames import far_origin, has_test_split, read_frames
 from splitnerf.data.images import write_image
-from splitnerf.data.json_files import write_json
 from splitnerf.data.layouts import colmap, transforms
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.lens import lens_intrinsics
@@ -297,22 +296,6 @@ EAST = np.eye(4, k=3)  # a pose's step along x
 def test_the_origin_moves_where_cameras_are_a_thousand_times_as_far_away_as_apart(distance, origin):
     frames = [Frame("", None, np.eye(4) + (distance + side) * EAST, {}) for side in (-3, 3)]
     assert far_origin(frames).tolist() == [origin, 0, 0]
-
-
-def test_a_capture_of_stanford_orb_has_its_masks_beside_its_photos(tmp_path):
-    """And radiance above 1."""
-    poses = sphere_poses()
-    for split, chosen in (("train", poses[:-1]), ("test", poses[-1:])):
-        frames = []
-        for i, pose in enumerate(chosen):
-            write_image(tmp_path / split / f"{i:04d}.exr", np.full((SIZE, SIZE, 3), 3.0, np.float32))
-            write_image(tmp_path / f"{split}_mask/{i:04d}.png", sphere_alpha(pose, CENTRE, RADIUS))
-            frames.append({"file_path": f"{split}/{i:04d}", "transform_matrix": pose.tolist()})
-        write_json(tmp_path / f"transforms_{split}.json", {"camera_angle_x": ANGLE, "frames": frames})
-    train = load_dataset(tmp_path, "train")
-    assert len(train) == len(poses) - 1 and len(load_dataset(tmp_path, "test")) == 1
-    assert np.array_equal(train.images[2, ..., 3] > 0.5, sphere_alpha(poses[2], CENTRE, RADIUS) > 0.5)
-    assert train.images[0, SIZE // 2, SIZE // 2, :3] == pytest.approx(1.055 * 3 ** (1 / 2.4) - 0.055, rel=1e-2)
 
 
 def n_views(path) -> int:

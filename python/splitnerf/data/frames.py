@@ -8,13 +8,13 @@ from types import ModuleType
 
 import numpy as np
 
-from splitnerf.data.layouts import colmap, neus, stanford_orb, transforms, view_folders
+from splitnerf.data.layouts import colmap, neus, transforms, view_folders
 from splitnerf.data.layouts.frame import Frame
 from splitnerf.data.normalisation import SAME_PLACE
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 
-LAYOUTS = (stanford_orb, transforms, view_folders, neus, colmap)
+LAYOUTS = (transforms, view_folders, neus, colmap)
 """The first that a folder has counts."""
 TEST_STRIDE = 8
 WORDS = {"train": r"(?<![a-z])train", "test": r"(?<![a-z])(test|eval)"}  # in the path of a split's image
