@@ -214,6 +214,17 @@ def test_photos_judge_whether_the_light_is_too_dark(ball, truth, trained, level)
     assert float(light) == pytest.approx(fit.level, rel=1e-3)
 
 
+@pytest.mark.parametrize("worse, level", [(1.4, 2.0), (1.6, 1.0)])
+def test_a_brighter_light_may_cost_photos_held_out_half_as_much_again(ball, worse, level, monkeypatch):
+    """Training has fitted them under its own light; beside white porcelain a wrong light had 2.2 times their error."""
+    (truth, _), (trained, _) = DIELECTRICS
+    fit = Refinement(photos(ball_of(ball, *truth), 2.0 * sky()), ball_of(ball, *trained), sky(), SETTINGS)
+    start = fit.held_errors() + 1e-3
+    monkeypatch.setattr(fit, "held_errors", lambda: worse * start)
+    fit.find_level(start)
+    assert fit.level == pytest.approx(level, rel=0.05)
+
+
 @pytest.mark.parametrize("seen", [False, True])
 def test_grey_metal_gives_its_tint_to_the_light_unless_photos_show_the_light(ball, seen):
     tint = np.float32([1.25, 1.0, 0.8])
