@@ -81,7 +81,7 @@ def test_steps_stay_on_the_gpu_and_all_waits_for_it_are_known(data, tmp_path, mo
     monkeypatch.setattr(occupancy, "ALL_CELLS_UNTIL", 20)
     monkeypatch.setattr(trainer.Training, "advance", watched)
     monkeypatch.setattr(SurfaceMesh, "poll", lambda mesh, wait=False: poll(mesh, wait=True))  # takes its mesh at once
-    settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 4608}  # so that samples fit
+    settings = {"min_step": 0.03} if name == "paper" else {"target_samples": 3072}  # so that samples fit
     settings |= {"mesh_every": 0.5, "mesh.background": True, "indirect_every": 50}
     config = tiny(name, steps=250, preview_every=1.0, checkpoint_minutes=1e3, **settings)
     with pretend_gpu(monkeypatch) as gpu:
