@@ -5,6 +5,7 @@
     shapes    eight hollow shapes in three materials, 4 minutes each
     scenes    objects with full truth, 30 minutes each
     kinds     objects of kinds that nothing else here is of, 8 minutes each, with pictures
+    nerf      scenes of NeRF at 400 x 400, whose truth is photos and the chair's normals, 30 minutes each
     time      error against time: half a minute to 30 minutes, two objects, two seeds
     skips     training with and without what a step leaves out, by equal time and by equal steps
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
@@ -143,6 +144,7 @@ PAGES = {
         200,
     ),
     "kinds": Page("Unseen kinds", tuple(KINDS), (("cpu", 8),), 100, pictures=True),
+    "nerf": Page("Scenes of NeRF", ("chair", "lego"), (("cpu", 30),), 400),
     "time": Page(
         "Error against time",
         ("boombox", "knot"),
@@ -177,8 +179,9 @@ def splitnerf(*words: object) -> bool:
 
 def data_of(scene: str, size: int, work: Path) -> Path | None:
     """The folder of a scene's images, which are rendered if they are not there yet; None where that is impossible."""
-    if (ready := DATA / "scenes" / scene).is_dir():
-        return ready
+    for ready in (DATA / "scenes" / scene, DATA / "nerf_synthetic_400" / scene):
+        if ready.is_dir():
+            return ready
     data, counts = (
         work / f"data/{scene.replace(' ', '_')}_{size}",
         ("--size", size, "--train", 60, "--test", 6, "--spp", 64),
