@@ -12,16 +12,21 @@
 namespace splitnerf {
 namespace {
 
+// Runs a loop over n indices, which gets the body, and expects each index once, in parts of at most `most`.
+template <typename Loop> void expect_each_once(int64_t n, int64_t most, Loop loop) {
+  std::vector<std::atomic<int>> visits(n);
+  loop([&](int64_t begin, int64_t end) {
+    ASSERT_TRUE(0 <= begin && begin < end && end <= n && end - begin <= most);
+    for (int64_t i = begin; i < end; ++i) ++visits[i];
+  });
+  for (int64_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << i << " of " << n;
+}
+
 TEST(Parallel, VisitsEveryIndexOnce) {
   for (const int64_t n : {0, 1, 7, 64, 1000, 100003}) {
-    for (const int64_t grain : {0, 1, 64, 200000}) {
-      std::vector<std::atomic<int>> visits(n);
-      parallel_for(n, grain, [&](int64_t begin, int64_t end) {
-        ASSERT_TRUE(0 <= begin && begin < end && end <= n);
-        for (int64_t i = begin; i < end; ++i) ++visits[i];
-      });
-      for (int64_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << i << " of " << n;
-    }
+    for (const int64_t grain : {0, 1, 64, 200000})
+      expect_each_once(n, n, [&](auto body) { parallel_for(n, grain, body); });
+    expect_each_once(n, 64, [&](auto body) { parallel_for_uneven(n, 64, body); });
   }
 }
 
@@ -34,17 +39,6 @@ TEST(Parallel, ExceptionsReachTheCaller) {
   EXPECT_THROW(fail_at(0), std::runtime_error);
   EXPECT_THROW(fail_at(9999), std::runtime_error);
   EXPECT_NO_THROW(fail_at(10000));
-}
-
-TEST(Parallel, UnevenWorkIsDoneOnce) {
-  for (const int64_t n : {0, 1, 7, 1000, 100003}) {
-    std::vector<std::atomic<int>> visits(n);
-    parallel_for_uneven(n, 64, [&](int64_t begin, int64_t end) {
-      ASSERT_TRUE(0 <= begin && begin < end && end <= n && end - begin <= 64);
-      for (int64_t i = begin; i < end; ++i) ++visits[i];
-    });
-    for (int64_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << i << " of " << n;
-  }
 }
 
 TEST(Parallel, NoMoreUnevenWorkIsTakenAfterAnExceptionWhichKeepsItsType) {

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 from blender_data import SIZE, edit, look_at, make_blender, set_pose, sphere_alpha
 from layout_scenes import CENTRE, COUNT, LENS, RADIUS, sphere_poses, write_transforms
 from op_checks import generator
@@ -16,8 +17,9 @@ from splitnerf.errors import InputError
 from splitnerf.evaluate.protocol import evaluate_maps
 from splitnerf.refinement.outline import outline_pixels
 from splitnerf.refinement.pixels import covered_pixels
-from splitnerf.render.occupancy import visual_hull
+from splitnerf.render.stereo import visual_hull
 from splitnerf.training.batches import PixelSource
+from tiny_runs import tiny
 
 OBJECT, IGNORE = Reading(mask_kind="object"), Reading(mask_kind="ignore")
 
@@ -205,14 +207,14 @@ def test_training_draws_known_pixels_only(half_known, share):
 
 
 def test_the_visual_hull_keeps_what_is_not_known(half_known):
-    def hull(data):
-        source = PixelSource(data, 0.5, generator())
-        return visual_hull(32, 1.5, source.possible, source.poses, source.intrinsics)
-
+    """In the run's box and cells."""
+    config, source = tiny(box=1.3, grid_resolution=32), PixelSource(half_known, 0.5, generator())
+    hull = lambda data: PixelSource(data, 0.5, generator()).hull(config)
     whole, half = hull(halved(lambda i: False)), hull(half_known)
     as_background = hull(dataclasses.replace(half_known, known=None))
     assert (half | ~whole).all() and half.sum() < 1.5 * whole.sum()
     assert as_background.sum() < 0.7 * whole.sum()
+    assert torch.equal(half, visual_hull(32, 1.3, source.possible, source.poses, source.intrinsics))
 
 
 def test_the_box_does_not_count_what_is_not_known(half_known):

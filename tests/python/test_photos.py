@@ -21,7 +21,7 @@ from splitnerf.data.pixels import Photos, decoded, encoded, file_of
 from splitnerf.data.reading import Reading
 from splitnerf.errors import InputError
 from splitnerf.ops.rays import draw_rays
-from splitnerf.render.occupancy import widened
+from splitnerf.render.stereo import widened
 from splitnerf.training import batches, loop
 from splitnerf.training.batches import PixelSource, averaging_factor, training_photos
 from test_known_pixels import ignoring_scene

@@ -16,7 +16,7 @@ from splitnerf.errors import InputError
 from splitnerf.fields import EvaluatedLight, Light
 from splitnerf.pipeline import check_repeatable, load_run
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import OccupancyGrid, visual_hull
+from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.training import loop, meshes, metrics
 from splitnerf.training.finite import Diverged
 from splitnerf.training.gpu_step import GpuStep
@@ -311,15 +311,6 @@ def test_rays_are_drawn_near_the_masks_as_often_as_is_set(data, tmp_path):
         inside.append((training.source.draw(2000)[2][:, 3] > 0).float().mean().item())
     masks = (dataset.images[..., 3] > 0).mean()
     assert inside[0] == pytest.approx(masks, abs=0.04) and inside[1] > inside[0] + 0.1
-
-
-def test_the_hull_is_that_of_the_runs_box_and_cells(data, tmp_path):
-    config = tiny(box=1.2)
-    source = loop.Training(load_dataset(data), config, tmp_path, torch.device("cpu")).source
-    cameras, hull = (source.possible, source.poses, source.intrinsics), source.hull(config)
-    assert 0 < hull.float().mean() < 0.6
-    assert torch.equal(hull, visual_hull(16, 1.2, *cameras))
-    assert not torch.equal(hull, visual_hull(16, 1.5, *cameras))
 
 
 # ---- the surface as a mesh, made at once or beside the training ----

@@ -11,8 +11,9 @@ from splitnerf.fields import Occlusion
 from splitnerf.ops import HashGridSpec, light_queries
 from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
 from splitnerf.render.model import SceneModel
-from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid, visual_hull
+from splitnerf.render.occupancy import AveragedGrid, OccupancyGrid, make_grid
 from splitnerf.render.renderer import ProbePoints, find_samples, render_rays, render_view, sample_step
+from splitnerf.render.stereo import visual_hull
 from splitnerf_tools.synth.rendering import orbit
 from tiny_runs import tiny
 
@@ -344,15 +345,14 @@ class TestAveragedGrid:
             assert grid.cells.shape == (12, 12, 12) and (grid.cells == CELL_OCCUPIED).all()
 
 
-class TestHull:
-    def test_one_mask_of_many_that_is_cut_short_does_not_cut_the_hull(self):
-        size, focal, distance = 80, 50.0, 4.0
-        y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
-        disc = ((x - 40) ** 2 + (y - 40) ** 2) < (focal * OF_SPHERE / math.sqrt(distance**2 - OF_SPHERE**2)) ** 2
-        lenses = torch.tensor([[focal, focal, 40.0, 40.0]] * 40)
-        poses = torch.from_numpy(orbit(40, distance, elevation=0.0)).float()
-        inside = (OccupancyGrid(32, 1.5).centres().norm(dim=1) < OF_SPHERE).view(32, 32, 32)
-        for n_cut, whole in ((1, True), (2, False)):
-            masks = disc.float().expand(40, -1, -1).clone()
-            masks[:n_cut] *= y < 40
-            assert bool(visual_hull(32, 1.5, masks, poses, lenses)[inside].all()) == whole
+def test_one_mask_of_many_that_is_cut_short_does_not_cut_the_hull():
+    size, focal, distance = 80, 50.0, 4.0
+    y, x = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="ij")
+    disc = ((x - 40) ** 2 + (y - 40) ** 2) < (focal * OF_SPHERE / math.sqrt(distance**2 - OF_SPHERE**2)) ** 2
+    lenses = torch.tensor([[focal, focal, 40.0, 40.0]] * 40)
+    poses = torch.from_numpy(orbit(40, distance, elevation=0.0)).float()
+    inside = (OccupancyGrid(32, 1.5).centres().norm(dim=1) < OF_SPHERE).view(32, 32, 32)
+    for n_cut, whole in ((1, True), (2, False)):
+        masks = disc.float().expand(40, -1, -1).clone()
+        masks[:n_cut] *= y < 40
+        assert bool(visual_hull(32, 1.5, masks, poses, lenses)[inside].all()) == whole

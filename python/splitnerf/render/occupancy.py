@@ -12,14 +12,12 @@ from torch.nn.functional import logsigmoid
 from splitnerf.config import Config
 from splitnerf.devices import start_fetching
 from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED, CELL_OPAQUE
-from splitnerf.render.rays import projected
 
 DENSITY_CUTOFF = 7.0  # where |f| > cutoff / s, the NeuS density is below e^-7 of its peak
 LIPSCHITZ = 1.25  # bound on |grad f|; the eikonal loss keeps it in practice
 REFRESHED_SHARE = 0.1, 0.02  # share of the cells far from the surface that an update evaluates, and from SETTLED on
 SETTLED = 1000  # steps, after which the surface moves little
 NEAR_MARGIN = 1.1  # growth of the bound from one update to the next on a GPU, as the sharpness falls
-WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 DECAY, MIN_CELL_OPACITY, ALL_CELLS_UNTIL = 0.95, 1e-3, 256
 
 
@@ -128,48 +126,3 @@ def evaluate(sdf: Callable[[Tensor], Tensor], points: Tensor) -> Tensor:
     """The field's values [n] at points [n, 3], evaluated in chunks."""
     chunk = 1 << (16 if points.device.type == "cpu" else 20)
     return torch.cat([sdf(part) for part in points.split(chunk)]) if len(points) else points[:, 0]
-
-
-def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
-    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it,
-    except for a few (:data:`WRONG_MASKS`): one mask that is cut short must not cut the object.
-
-    Args:
-        resolution: Cells along an edge.
-        box: Half size of the cube, scene units.
-        masks: [n, H, W] in [0, 1], or bool.
-        poses: [n, 4, 4] camera-to-world, OpenGL axes.
-        intrinsics: [n, 4] fx, fy, cx, cy in the masks' pixels.
-    """
-    grid = OccupancyGrid(resolution, box, device=masks.device)
-    centres, cell = grid.centres(), 2 * box / resolution
-    n, height, width = masks.shape
-    allowed = int(WRONG_MASKS * n)
-    misses, sights = torch.zeros(2, len(centres), dtype=torch.int32, device=masks.device)
-    for i in range(n):
-        inside = (misses <= allowed).nonzero().squeeze(1)
-        camera = (centres[inside] - poses[i, :3, 3]) @ poses[i, :3, :3]
-        depth = -camera[:, 2]
-        # The mask is widened by a cell's size in pixels, so that thin parts keep their cells.
-        radius = int(math.ceil(float(intrinsics[i, 0]) * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
-        wide = widened(masks[i] > 0, radius)
-        column, row = projected(camera, intrinsics[i]).floor().long().unbind(1)
-        seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        misses[inside[seen]] += ~wide[row[seen], column[seen]]
-        sights[inside[seen]] += 1
-    return ((misses <= allowed) & (misses <= WRONG_MASKS * sights)).view((resolution,) * 3)
-
-
-def widened(mask: Tensor, radius: int) -> Tensor:
-    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns. A mask that was widened by r, moved
-    by up to r + 1 to both sides, leaves no gap: a few moves make any radius."""
-    for axis in (0, 1):
-        reached = 0
-        while reached < min(radius, mask.shape[axis]):
-            step = min(radius - reached, reached + 1)
-            wide, size = mask.clone(), mask.shape[axis] - step
-            if size > 0:
-                wide.narrow(axis, step, size).logical_or_(mask.narrow(axis, 0, size))
-                wide.narrow(axis, 0, size).logical_or_(mask.narrow(axis, step, size))
-            mask, reached = wide, reached + step
-    return mask

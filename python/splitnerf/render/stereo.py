@@ -1,7 +1,8 @@
-"""Depth from photos alone, without materials and light: each photo's pixels are compared with its neighbours' at many depths."""
+"""Shape from photos alone, without materials and light: the visual hull of the masks, and depths, at which a photo is like its neighbours."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from splitnerf.data.dataset import Dataset
 from splitnerf.data.pixels import averaged_codes, decoded
 from splitnerf.ops import march_rays
 from splitnerf.ops.rays import CELL_EMPTY, CELL_OCCUPIED
+from splitnerf.render.occupancy import OccupancyGrid
 from splitnerf.render.rays import image_rays, projected
 
 MOST_PHOTOS, MOST_VIEWS = 150, 50  # that are compared, and that get depths
@@ -25,7 +27,53 @@ WINDOW = 3  # pixels on each side of a compared one
 VARIANCE_FLOOR = 1e-7  # of the product of two windows' variances of grey values, for windows without contrast
 ELSEWHERE = 0.1  # scene units from a depth to others that are no part of the same peak
 HIDDEN = 0.1  # scene units behind a photo's surface from which a point counts as hidden
+WRONG_MASKS = 0.03  # share of the views that may miss a cell of the visual hull
 PRIOR_WEIGHT = 0.05  # of what was known before, beside one pixel's correlation
+
+
+def visual_hull(resolution: int, box: float, masks: Tensor, poses: Tensor, intrinsics: Tensor) -> Tensor:
+    """[r, r, r] bool: the cells whose centre, within about a cell, projects into the mask of every view that sees it,
+    except for a few (:data:`WRONG_MASKS`): one mask that is cut short must not cut the object.
+
+    Args:
+        resolution: Cells along an edge.
+        box: Half size of the cube, scene units.
+        masks: [n, H, W] in [0, 1], or bool.
+        poses: [n, 4, 4] camera-to-world, OpenGL axes.
+        intrinsics: [n, 4] fx, fy, cx, cy in the masks' pixels.
+    """
+    grid = OccupancyGrid(resolution, box, device=masks.device)
+    centres, cell = grid.centres(), 2 * box / resolution
+    n, height, width = masks.shape
+    allowed = int(WRONG_MASKS * n)
+    misses, sights = torch.zeros(2, len(centres), dtype=torch.int32, device=masks.device)
+    for i in range(n):
+        inside = (misses <= allowed).nonzero().squeeze(1)
+        camera = (centres[inside] - poses[i, :3, 3]) @ poses[i, :3, :3]
+        depth = -camera[:, 2]
+        # The mask is widened by a cell's size in pixels, so that thin parts keep their cells.
+        radius = int(math.ceil(float(intrinsics[i, 0]) * cell / max(1e-3, float(depth.median())))) if len(depth) else 0
+        wide = widened(masks[i] > 0, radius)
+        column, row = projected(camera, intrinsics[i]).floor().long().unbind(1)
+        seen = (depth > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        misses[inside[seen]] += ~wide[row[seen], column[seen]]
+        sights[inside[seen]] += 1
+    return (misses <= WRONG_MASKS * sights).view((resolution,) * 3)
+
+
+def widened(mask: Tensor, radius: int) -> Tensor:
+    """[H, W] bool, the pixels within `radius` of one of `mask` [H, W] along rows and columns. A mask that was widened by r, moved
+    by up to r + 1 to both sides, leaves no gap: a few moves make any radius."""
+    for axis in (0, 1):
+        reached = 0
+        while reached < min(radius, mask.shape[axis]):
+            step = min(radius - reached, reached + 1)
+            wide, size = mask.clone(), mask.shape[axis] - step
+            if size > 0:
+                wide.narrow(axis, step, size).logical_or_(mask.narrow(axis, 0, size))
+                wide.narrow(axis, 0, size).logical_or_(mask.narrow(axis, step, size))
+            mask, reached = wide, reached + step
+    return mask
 
 
 class GreyPhotos(NamedTuple):

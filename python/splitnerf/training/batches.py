@@ -19,9 +19,9 @@ from splitnerf.data.pixels import ask_for, at_unit_exposure, averaged_codes, dec
 from splitnerf.errors import note
 from splitnerf.memory import give_back
 from splitnerf.ops.rays import EdgeRuns, PixelList, draw_rays, read_pixels
-from splitnerf.render.occupancy import visual_hull, widened
 from splitnerf.render.rays import pixel_matrix
 from splitnerf.render.renderer import ProbePoints
+from splitnerf.render.stereo import visual_hull, widened
 
 LEAST_EDGE = 8  # pixels along the shorter edge of an average
 

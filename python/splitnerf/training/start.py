@@ -42,7 +42,7 @@ FULL, FULL_FINE = 0.55, 0.35  # of the hull: what fills more is no hollow thing,
 # Part of the free windows' mean correlation that those which follow the result must have: measured 0.97 to 1.06, of metal bowls and mugs
 # 0.83 to 0.89, of boombox 0.81 to 0.84. A shape of less is tried.
 FOLLOWED, FOLLOWED_TRIED = 0.95, 0.8
-# Minutes of training from which on photos are compared, which takes 3 s of a core, and shapes that are not sure tried, which takes 40. A
+# Minutes of training from which on photos are compared, which takes 3 to 30 s of a core, and shapes that are not sure tried, which takes 40. A
 # sphere alone brought boombox in half a minute to 26.4 dB of relit views, not 23.4, and a knot of metal in one to 29.0, not 20.0.
 COMPARED_FROM, TRIED_FROM = 0.6, 2.5
 FOLLOWING = 0.06, 0.0125  # reach and step of the depths next to the result
