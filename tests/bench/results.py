@@ -402,7 +402,8 @@ def means(rows: list[Row]) -> list[str]:
     """A line for each number of minutes: the means of the refined rows over scenes and seeds."""
     lines = []
     for minutes in sorted({row["minutes"] for row in rows}, key=float):
-        chosen = [row for row in rows if row["minutes"] == minutes and row["asset"] == "refined" and row["relit, dB"]]
+        here = (row for row in rows if row["minutes"] == minutes and row["asset"] == "refined")
+        chosen = [row for row in here if any(row[column] for column in list(SCORES)[:4])]
         values = {column: [float(row[column]) for row in chosen if row[column]] for column in list(SCORES)[:4]}
         text = ", ".join(f"{column[:-4]} {sum(v) / len(v):.1f} dB" for column, v in values.items() if v)
         if chosen:

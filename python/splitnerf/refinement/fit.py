@@ -54,7 +54,6 @@ SMOOTH = 1.0, 2.0, 1.0  # differences of neighbours' steps where a texel is as w
 FLAT = 0.0, 0.5, 2.0  # differences of neighbours' values; edges cost little
 LIKE = 0.5, 2.0  # differences of a texel's roughness and metallic from the usual ones of its colour
 ANCHOR = 0.02  # distance from the start
-SEEN_OFTEN = 20.0  # sightings below which the prior weighs more: its units, mean curvatures, grow with them, what is known before does not
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
 LEAST_BATCHES = 8  # of a sweep, however short the time
@@ -162,10 +161,9 @@ class Refinement:
         pixel = texels_per_pixel(dataset, asset)
         self.patch_width = patch_width(pixel)
         self.sightings = len(self.pixels) * pixel**2 / max(len(self.texels.index), 1)
-        more = max(1.0, SEEN_OFTEN / max(self.sightings, 1.0))
         smooth = max(1.0, self.patch_width / PATCH_PIXELS) ** 2 * per_unknown(*SMOOTH)
         flat, anchor, like = per_unknown(*FLAT), per_unknown(*[ANCHOR] * 3), torch.tensor(LIKE)
-        self.prior = Prior(self.texels.pairs, more * smooth, more * flat, GROUPS, more * anchor, more * like)
+        self.prior = Prior(self.texels.pairs, smooth, flat, GROUPS, anchor, like)
         self.n_batches = self.n_sweeps = 0
         self.step_seconds = 0.0  # that the last sweep took after its batches
         self.tint = tint_of_light(self.texels.start) if self.seen is None else torch.ones(3)
