@@ -1,13 +1,18 @@
 # CUDA: sets SPLITNERF_WITH_CUDA and, where it is on, enables the language.
 #
-# AUTO takes it where a working compiler is found. One architecture keeps a build short: that of the machine's GPU, else sm_90;
-# SPLITNERF_CUDA_RELEASE builds what a wheel carries, and CMAKE_CUDA_ARCHITECTURES says otherwise.
-set(SPLITNERF_CUDA AUTO CACHE STRING "Build the operators for the GPU: ON, OFF or AUTO (where a CUDA compiler is found)")
+# AUTO takes it where a working compiler and a GPU are found. One architecture keeps a build short: that of the machine's GPU, else
+# sm_90; SPLITNERF_CUDA_RELEASE builds what a wheel carries, and CMAKE_CUDA_ARCHITECTURES says otherwise.
+set(SPLITNERF_CUDA AUTO CACHE STRING "Build the operators for the GPU: ON, OFF or AUTO (where a CUDA compiler and a GPU are found)")
 set_property(CACHE SPLITNERF_CUDA PROPERTY STRINGS ON OFF AUTO)
 option(SPLITNERF_CUDA_LINES "Lines of the sources in the GPU code, for profilers: they name the folder of the sources" ON)
 option(SPLITNERF_CUDA_RELEASE "GPU code for sm_80, sm_90 and, as PTX, what comes after" OFF)
 set(SPLITNERF_WITH_CUDA OFF)
-if(SPLITNERF_CUDA STREQUAL "AUTO" OR SPLITNERF_CUDA)
+execute_process(COMMAND nvidia-smi --query-gpu=compute_cap --format=csv,noheader
+  OUTPUT_VARIABLE found_gpus ERROR_QUIET RESULT_VARIABLE no_gpu)
+if(SPLITNERF_CUDA STREQUAL "AUTO" AND NOT no_gpu EQUAL 0 AND NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+  set(SPLITNERF_CUDA OFF)
+endif()
+if(SPLITNERF_CUDA)
   if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
     find_program(SPLITNERF_NVCC nvcc PATHS /usr/local/cuda/bin /opt/cuda/bin)
     if(SPLITNERF_NVCC)
@@ -27,14 +32,10 @@ if(SPLITNERF_WITH_CUDA)
   if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
     if(SPLITNERF_CUDA_RELEASE)
       set(CMAKE_CUDA_ARCHITECTURES 80-real 90)
+    elseif(no_gpu EQUAL 0 AND found_gpus MATCHES "^([0-9]+)\\.([0-9]+)")
+      set(CMAKE_CUDA_ARCHITECTURES ${CMAKE_MATCH_1}${CMAKE_MATCH_2}-real)
     else()
-      execute_process(COMMAND nvidia-smi --query-gpu=compute_cap --format=csv,noheader
-        OUTPUT_VARIABLE found_gpus ERROR_QUIET RESULT_VARIABLE no_gpu)
-      if(no_gpu EQUAL 0 AND found_gpus MATCHES "^([0-9]+)\\.([0-9]+)")
-        set(CMAKE_CUDA_ARCHITECTURES ${CMAKE_MATCH_1}${CMAKE_MATCH_2}-real)
-      else()
-        set(CMAKE_CUDA_ARCHITECTURES 90-real)
-      endif()
+      set(CMAKE_CUDA_ARCHITECTURES 90-real)
     endif()
   endif()
   enable_language(CUDA)

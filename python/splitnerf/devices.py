@@ -23,7 +23,7 @@ def choose_device(name: str) -> torch.device:
         return torch.device("cpu")
     if not _core.cuda_architectures():
         raise InputError(
-            f"--device {name}: this build has no GPU kernels; install it where nvcc is found (docs/cuda.md)"
+            f"--device {name}: this build has no GPU kernels; install it where nvcc and a GPU are found (docs/cuda.md)"
         )
     if not torch.cuda.is_available():
         raise InputError(f"--device {name}: torch finds no GPU; install a torch built for CUDA and its driver")

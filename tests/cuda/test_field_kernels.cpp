@@ -3,6 +3,7 @@
 
 #include "check.h"
 #include "gpu.h"
+#include "runtime/cuda_on_cpu.h"
 #include "splitnerf/march.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/ops_cuda.h"
@@ -193,6 +194,24 @@ TEST(FieldKernels, SdfFieldOfManyOutputs) {
   EXPECT_THROW(cuda::sdf_field(gpu.queue(), field.view(), 1, three.data(), results.view()), std::invalid_argument);
 }
 
+// What a GPU is asked for: an addition for each point, open level, corner and pair of features, and as many launches whatever n.
+TEST(FieldKernels, CountsOfTheFieldsGradients) {
+  const HashGridShape shape{5, 2, 4, 1.5, 8};
+  for (const int64_t n : {1, 130, 260}) {
+    Random random(3);
+    const Lengthy<float, Half> field(random, shape, 64, 13);
+    const auto x = random.uniforms<float>(3 * n, -1.7, 1.7), go = random.uniforms<float>(13 * n),
+               gf = random.uniforms<float>(10 * n), gg = random.uniforms<float>(3 * n);
+    FieldGradients<float> to(field);
+    Gpu gpu;
+    cuda_on_cpu::take_counts();
+    cuda::sdf_field_backward(gpu.queue(), field.view(), n, x.data(), {go.data(), gf.data(), gg.data()}, to.view());
+    const cuda_on_cpu::Counts counts = cuda_on_cpu::take_counts();
+    EXPECT_EQ(counts.atomics, n * (shape.n_levels - 1) * 8);
+    EXPECT_EQ(counts.launches, 4);  // weights, gradients, the blocks' sums, lengths; a memset besides
+  }
+}
+
 TEST(FieldKernels, SdfValues) {
   for (const int64_t n : {0, 1, 64, 200}) {
     Random random(2);
@@ -381,7 +400,9 @@ TEST(FieldKernels, AdamwOfManyArrays) {
       list->add({rule, {n, 1, k % 2 == 0, written[0], gradient, written[1], written[2], nullptr}});
     }
   }
+  cuda_on_cpu::take_counts();
   on_gpu(together.count(), together);
+  EXPECT_EQ(cuda_on_cpu::take_counts().launches, 1);
   cpu::run(alone.count(), alone);
   for (int k = 0; k < kMostAdamwArrays; ++k)
     for (int i = 0; i < 3; ++i) expect_near(kept[7 * k + 1 + i], kept[7 * k + 4 + i], 1e-14);

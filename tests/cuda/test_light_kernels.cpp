@@ -1,6 +1,7 @@
 // Kernels of the pre-integrated light, against the CPU.
 #include "check.h"
 #include "gpu.h"
+#include "runtime/cuda_on_cpu.h"
 #include "splitnerf/light_tables.h"
 #include "splitnerf/ops_cpu.h"
 #include "splitnerf/ops_cuda.h"
@@ -89,8 +90,13 @@ template <class T> void check_lookup(int64_t n, double tolerance) {
   Gpu gpu;
   cpu::light_lookup_backward(p, n, dirs.data(), rho.data(), g.data(), to_dirs.data(), to_rho.data(), to_levels.data(),
                              to_sh.data());
+  cuda_on_cpu::take_counts();
   cuda::light_lookup_backward(gpu.queue(), p, n, dirs.data(), rho.data(), g.data(), to_dirs1.data(), to_rho1.data(),
                               to_levels1.data(), to_sh1.data());
+  const cuda_on_cpu::Counts counts =
+      cuda_on_cpu::take_counts();  // four texels of two levels at most, in three channels
+  EXPECT_LE(counts.atomics, 24 * n + 3 * kShCoefficients * std::min<int64_t>((n + 31) / 32, 1024));
+  EXPECT_EQ(counts.launches, n > 0);
   expect_near(radiance1, radiance, tolerance), expect_near(to_dirs1, to_dirs, 10 * tolerance);
   expect_near(to_rho1, to_rho, 10 * tolerance);
   expect_near(to_levels1, to_levels, tolerance), expect_near(to_sh1, to_sh, tolerance);

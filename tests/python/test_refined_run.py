@@ -424,6 +424,7 @@ def test_the_bar_and_the_last_line_say_what_changes(painted, folder, capsys):
         ({}, f"{after:.2f} dB"),
         ({"delivered": 0, "lamp": True, "normal_texture": False}, "no step"),
         ({"held_out_psnr": [30.0, 29.0], "lamp": None}, "photos held out lose what training had fitted"),
+        ({}, "no highlight tells how bright the light is"),
         ({"level": 1.1}, "the light was made 1.10 times as bright"),
         ({"tint": [1.25, 1.0, 0.8]}, "red, green, blue are multiplied by 1.25, 1.00, 0.80"),
     ):
@@ -435,7 +436,7 @@ def test_the_report_shows_before_and_after(run):
     page = (run / "report.html").read_text()
     for name in ("photo", "before", "after"):
         assert len(re.findall(rf'<img[^>]* alt="[^"]*, {name}"', page)) == 2, name  # test views
-    for text in ("one factor per colour channel", "are saturated in the photos", "<h2>Refinement</h2>"):
+    for text in ("one factor per colour channel", "No highlight tells how bright", "are saturated in the photos", "<h2>Refinement</h2>"):
         assert text in page
 
 
@@ -443,7 +444,7 @@ def test_the_reports_numbers_are_those_of_its_pictures():
     photo = np.full((8, 8, 3), 0.5)
     page = {
         "views": [{"name": "a", "pictures": [photo, photo + 0.1, photo + 0.01], "coverage": [0.2, 0.1]}],
-        "summary": dict(steps=3, seconds=9.0, outline_error=None, saturated=0.125, lamp=True, delivered=2)
+        "summary": dict(steps=3, seconds=9.0, outline_error=None, saturated=0.125, lamp=True, delivered=2, level=1.0, tint=[1.0])
         | {"photos_psnr": [20.0, 30.0], "held_out_psnr": [21.0, 29.0]},
         "lights": [np.ones((4, 8, 3))] * 2,
     }

@@ -202,6 +202,8 @@ def print_summary(run: Path, evaluation: dict, step: int, seconds: float, device
 
 def print_refinement(summary: dict | None) -> None:
     """A line with the changes by the refinement, if there was one."""
+    from splitnerf.refinement.level import evidence
+
     if summary is None:
         return
     psnr = "{} {:.2f} -> {:.2f} dB".format
@@ -216,11 +218,8 @@ def print_refinement(summary: dict | None) -> None:
         )
     if summary["lamp"]:
         print("a lamp that training had smeared was made compact first; photos do not tell which of the two it was")
-    if summary["level"] != 1:
-        print(f"the light was made {summary['level']:.2f} times as bright, as highlights ask")
-    if max(summary["tint"]) > 1:
-        factors = ", ".join(f"{factor:.2f}" for factor in summary["tint"])
-        print(f"metal of one faint colour is taken for grey: the light's red, green, blue are multiplied by {factors}")
+    for told in evidence(summary["level"], summary["tint"]):
+        print(told)
     if summary["delivered"] == 0:
         print("no step helped the photos held out: the asset keeps the textures and the light from before the steps")
     if summary["detail"]:

@@ -43,6 +43,21 @@ def tint_of_light(values: Tensor) -> Tensor:
     return (middle - middle.mean()).exp() if n_agreeing >= LEAST_GREY * len(values) else torch.ones(3)
 
 
+def evidence(level: float, tint: list[float]) -> list[str]:
+    """What tells the level and the tint of the light of a run, in sentences; docs/results.md has the errors."""
+    told = [
+        "no highlight tells how bright the light is: where photos do not show it, albedo and light may be off by a tenth, at worst by a third"
+        if level == 1
+        else f"the light was made {level:.2f} times as bright, as highlights ask"
+    ]
+    if max(tint) > 1:
+        factors = ", ".join(f"{factor:.2f}" for factor in tint)
+        told.append(
+            f"metal of one faint colour is taken for grey: the light's red, green, blue are multiplied by {factors}"
+        )
+    return told
+
+
 def rest_level(level: float, lamp_gain: float) -> float:
     """The factor on the light at a level that dielectrics ask for. A lamp that makes all its power larger by a factor of more than 1 stands in a
     light that mirror images or photos have shown: that light stays, and dielectrics asked for the lamp, which makes highlights, too."""

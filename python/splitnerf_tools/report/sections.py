@@ -20,6 +20,7 @@ from splitnerf.data.gltf.document import Document
 from splitnerf.data.images import area_average, linear_to_srgb, over_background
 from splitnerf.errors import InputError
 from splitnerf.evaluate.metrics import psnr
+from splitnerf.refinement.level import evidence
 
 from splitnerf_tools.report.embedding import (
     WHITE_PER_MEAN,
@@ -264,6 +265,7 @@ def refinement_section(page: Mapping) -> dict:
         "steps": summary["steps"],
         "seconds": f"{summary['seconds']:.0f}",
         "saturated": f"{100 * summary['saturated']:.1f} %",
+        "evidence": evidence(summary["level"], summary["tint"]),
     }
 
 

@@ -13,6 +13,7 @@
 #include <numeric>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -380,6 +381,10 @@ void* dynamic_shared_memory() { return Block::running->dynamic(); }
 void set_order(Order wanted) { order = wanted; }
 void allow_shared_memory(const void* kernel, int bytes) { allowed[kernel] = size_t(bytes); }
 
+Counts counts{};
+Counts take_counts() { return std::exchange(counts, Counts{}); }
+void count_atomic() { ++counts.atomics; }
+
 void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::function<void()>& thread) {
   const size_t asked = allowed.count(kernel) ? allowed.at(kernel) : 0;
   const size_t n_threads = size_t(block.x) * block.y * block.z;
@@ -391,6 +396,7 @@ void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::fun
     last_error = "more shared memory than was allowed for the kernel";
   }
   if (!last_error.empty()) return;
+  ++counts.launches;
   begin_launch();
   try {
     for (unsigned z = 0; z < grid.z; ++z)

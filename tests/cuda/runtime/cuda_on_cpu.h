@@ -64,6 +64,13 @@ void set_order(Order order);
 void allow_shared_memory(const void* kernel, int bytes);
 void run(const void* kernel, dim3 grid, dim3 block, size_t bytes, const std::function<void()>& thread);
 
+// What kernels have asked for since the last call: launches, and atomic additions, of which one to two or four neighbours is one.
+struct Counts {
+  int64_t launches, atomics;
+};
+Counts take_counts();
+void count_atomic();
+
 template <class... Parameters> struct Launch {
   void (*kernel)(Parameters...);
   dim3 grid, block;
@@ -87,12 +94,11 @@ template <class T> T shuffle(unsigned mask, T value, int from, CallSite site) {
   return value;
 }
 
-template <class T> T add_atomically(T* to, T value) {
+template <class T> void add_atomically(T* to, T value) {
   T before, after;
   __atomic_load(to, &before, __ATOMIC_RELAXED);
   do after = before + value;
   while (!__atomic_compare_exchange(to, &before, &after, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED));
-  return before;
 }
 
 }  // namespace cuda_on_cpu
@@ -128,12 +134,14 @@ struct float4 {
 inline float2 make_float2(float x, float y) { return {x, y}; }
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
 
-inline float atomicAdd(float* to, float value) { return cuda_on_cpu::add_atomically(to, value); }
-inline double atomicAdd(double* to, double value) { return cuda_on_cpu::add_atomically(to, value); }
-inline float2 atomicAdd(float2* to, float2 v) { return {atomicAdd(&to->x, v.x), atomicAdd(&to->y, v.y)}; }
-inline float4 atomicAdd(float4* to, float4 v) {
-  return {atomicAdd(&to->x, v.x), atomicAdd(&to->y, v.y), atomicAdd(&to->z, v.z), atomicAdd(&to->w, v.w)};
+template <int N, class T> void add_each_atomically(T* to, const T (&values)[N]) {
+  cuda_on_cpu::count_atomic();
+  for (int i = 0; i < N; ++i) cuda_on_cpu::add_atomically(to + i, values[i]);
 }
+inline void atomicAdd(float* to, float value) { add_each_atomically(to, {value}); }
+inline void atomicAdd(double* to, double value) { add_each_atomically(to, {value}); }
+inline void atomicAdd(float2* to, float2 v) { add_each_atomically(&to->x, {v.x, v.y}); }
+inline void atomicAdd(float4* to, float4 v) { add_each_atomically(&to->x, {v.x, v.y, v.z, v.w}); }
 
 // Shared memory, and a launch, as launch.cuh writes them.
 #define SPLITNERF_SHARED(type, name, dims) \
