@@ -18,7 +18,7 @@ out=$(cd "$1" && pwd) && shift
 python_version=${PYTHON_VERSION:-$(python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')}
 
 # To train and to test; with what these import. Embree is in the wheel.
-wheels="pip numpy scipy pillow trimesh OpenImageIO xatlas fast-simplification tomli-w shtab tqdm jinja2 markupsafe
+wheels="pip numpy scipy pillow trimesh OpenImageIO xatlas fast-simplification tomli-w tqdm jinja2 markupsafe
   pytest pluggy iniconfig packaging pygments hypothesis sortedcontainers mpmath"
 [ "$python_version" != 3.10 ] || wheels="$wheels tomli exceptiongroup typing-extensions"
 platforms="manylinux1_x86_64 manylinux2014_x86_64"

@@ -48,7 +48,7 @@ from bench.kinds import KINDS  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))
-SOURCES = ("cpp", "python/splitnerf")
+SOURCES = "cpp", "python/splitnerf", ":!cpp/cuda", ":!python/splitnerf/cli"
 SCORES = {  # column: the evaluation's keys, digits
     "relit, dB": (("relight", "psnr"), 1),
     "albedo, dB": (("albedo", "psnr"), 1),

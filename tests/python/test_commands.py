@@ -1,14 +1,13 @@
-"""The command line: help, names, completion, and a program without the tools."""
+"""The command line: help, names, and a program without the tools."""
 
 import shlex
 import shutil
-import subprocess
 import sys
 
 import pytest
 from splitnerf import plugins
 from splitnerf.cli import BAD_INPUT, COMMANDS, DONE, build_parser, main
-from splitnerf.cli.common import SHELLS, TITLE, commands_of
+from splitnerf.cli.common import TITLE, commands_of
 from splitnerf.plugins import installed
 from splitnerf.run_folder import is_finished
 from splitnerf_tools.plugin import PLUGIN
@@ -16,13 +15,6 @@ from tiny_runs import refused, train
 
 PARSERS = commands_of(build_parser())
 EXAMPLES = {name: (parser.epilog or "").partition(TITLE)[2].split("\n")[1:] for name, parser in PARSERS.items()}
-
-
-def script(shell: str, capsys) -> str:
-    with pytest.raises(SystemExit) as ended:
-        build_parser().parse_args(["--print-completion", shell])
-    assert ended.value.code == 0
-    return capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", PARSERS)
@@ -39,32 +31,6 @@ def test_help_keeps_examples_and_wraps_the_rest(name, monkeypatch):
     said = PARSERS[name].format_help().splitlines()
     assert said[len(said) - len(EXAMPLES[name]) :] == EXAMPLES[name]
     assert len(said) <= 66 and all(len(line) <= 80 for line in said if line not in EXAMPLES[name])
-
-
-@pytest.mark.parametrize("shell", SHELLS)
-def test_a_completion_knows_all_commands_and_their_options(shell, capsys):
-    text = script(shell, capsys)
-    assert all(name in text for name in PARSERS)
-    assert "--max-minutes" in text or "max-minutes" in text
-
-
-def completed(text: str, *words: str) -> list[str]:
-    """What bash offers for the last word."""
-    typed = " ".join(map(shlex.quote, words))
-    ask = f"COMP_WORDS=({typed}); COMP_CWORD={len(words) - 1}; _shtab_splitnerf; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    return subprocess.run(["bash", "-c", f"{text}\n{ask}"], capture_output=True, text=True, timeout=60).stdout.split()
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
-def test_bash_completes_commands_options_choices_and_files(capsys, tmp_path, monkeypatch):
-    text = script("bash", capsys)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "photos").mkdir()
-    (tmp_path / "photo.txt").touch()
-    assert completed(text, "splitnerf", "pre") == ["prepare"]
-    assert completed(text, "splitnerf", "train", "--pre") == ["--preset"]
-    assert completed(text, "splitnerf", "train", "--preset", "") == ["cpu", "fast", "paper"]
-    assert set(completed(text, "splitnerf", "train", "pho")) >= {"photos", "photo.txt"}
 
 
 def test_the_help_shows_each_command_below_the_title_of_its_group():

@@ -30,7 +30,7 @@ class Entry:
         draw: (source, n) to the rows, [n, ...] each.
         call: (rows, shared) of either dtype to the outputs, [n, ...] each.
         bound: Largest error of an output that the operator promises in float32.
-        gradient_bound: The same of a gradient.
+        gradient_bound: The same of a gradient; twice `bound` where none is given.
         reason: What the bound and the floor follow from.
         smooth: Names of rows to which there is a gradient.
         smooth_shared: The same of what the rows share.
@@ -68,3 +68,6 @@ class Entry:
     exact_bound: float = 1e-11
     size: int = 1
     chunk: int = 1 << 14
+
+    def __post_init__(self):
+        object.__setattr__(self, "gradient_bound", self.gradient_bound or 2 * self.bound)

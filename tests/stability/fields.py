@@ -95,7 +95,6 @@ def grid_entry(name: str, call, dtype: torch.dtype = torch.float32) -> Entry:
         smooth_shared=("table",),
         shared={"table": grid()["table"].to(dtype).float()},
         bound=2e-6,
-        gradient_bound=4e-6,
         reason=BY_CELL,
     )
 

@@ -81,7 +81,7 @@ def measure(entry: Entry, rows: Rows) -> Errors:
     spoilt = any(bool(row_error(got_shared[k][None], x[None], 0.0)[1]) for k, x in true_shared.items())
     if entry.conditioned:
         for probes, share in ROUNDS:
-            high = torch.maximum(forward / entry.bound, gradient / (entry.gradient_bound or torch.inf))
+            high = torch.maximum(forward / entry.bound, gradient / entry.gradient_bound)
             which = torch.nonzero((high > 1) & ~broken)[:, 0]
             which = which[torch.argsort(high[which], descending=True)[: int(share * entry.chunk)]]
             if len(which):

@@ -202,7 +202,6 @@ ENTRIES = (
         call=means,
         smooth=("weights", "values", "opacity"),
         bound=1e-6,
-        gradient_bound=2e-6,
         repair=lambda rows: rows | {"opacity": torch.where(rows["opacity"] < 1e-3, 0.0, rows["opacity"].clamp(max=1))},
         reason="a sum in float64 and one division",
     ),

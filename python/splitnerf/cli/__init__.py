@@ -12,18 +12,7 @@ from functools import partial
 
 import splitnerf
 from splitnerf.cli import evaluate, export, info, refine, relight, train
-from splitnerf.cli.common import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
-    INTERRUPTED,
-    SHELLS,
-    Help,
-    Parser,
-    PrintCompletion,
-    ProgramHelp,
-    commands_of,
-)
+from splitnerf.cli.common import BAD_INPUT, DONE, FAILED, INTERRUPTED, Help, Parser, ProgramHelp, commands_of
 from splitnerf.cli.streams import lasting_streams
 from splitnerf.errors import InputError, plain
 from splitnerf.files import reason
@@ -39,13 +28,6 @@ def build_parser() -> Parser:
         description="From photographs of one object with known cameras to a mesh, PBR materials and the HDR environment.",
     )
     parser.add_argument("--version", action="version", version=f"splitnerf {splitnerf.__version__}")
-    parser.add_argument(
-        "--print-completion",
-        action=PrintCompletion,
-        choices=SHELLS,
-        metavar="SHELL",
-        help=f"print the script that completes commands in a shell ({', '.join(SHELLS)})",
-    )
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
     groups = {}
     for title in TITLES:

@@ -1,4 +1,4 @@
-"""Shared by the commands: exit codes, the format of their help, completion, options that read data, and printed scores."""
+"""Shared by the commands: exit codes, the format of their help, options that read data, and printed scores."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from splitnerf.training.observer import Event
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-SHELLS = ("bash", "zsh", "tcsh")
 TITLE = "examples:"
 FEW = 4  # choices, which are all named
 
@@ -89,28 +88,6 @@ class ProgramHelp(Help):
     def _format_action(self, action: argparse.Action) -> str:
         text, title = super()._format_action(action), self._groups.get(action.dest)
         return f"{'':{self._current_indent - 2}}{title}:\n{text}" if title else text
-
-
-class PrintCompletion(argparse.Action):
-    """Prints the script that completes a parser's commands in a shell, and ends the program."""
-
-    def __call__(
-        self, parser: argparse.ArgumentParser, namespace: object, shell: str, option: str | None = None
-    ) -> None:
-        import shtab  # here: other commands need not load it
-
-        complete_files(parser, shtab.FILE)
-        print(shtab.complete(parser, shell))
-        parser.exit()
-
-
-def complete_files(parser: argparse.ArgumentParser, files: dict[str, str]) -> None:
-    """Marks all arguments of a parser and of its commands that are paths, so that names of files complete them."""
-    for command in commands_of(parser).values():
-        complete_files(command, files)
-    for action in parser._actions:
-        if action.type is Path:
-            action.complete = files
 
 
 def add_reading_options(parser: argparse.ArgumentParser, default: str = "as the data state or suggest") -> None:

@@ -229,9 +229,8 @@ def refinement_section(page: Mapping) -> dict:
     """The contents of the section for the template.
 
     Args:
-        page: `views`, each with `name`, `pictures` (photo, before and after, [H, W, 3] sRGB on white), and `coverage` (mean
-            squared errors before and after); `summary`, the scores'
-            part of the refinement; `lights`, linear maps [h, w, 3] before and after, are shown with the lights.
+        page: `views`, each with `name`, `pictures` (photo, before and after, [H, W, 3] sRGB on white), and `coverage` (mean squared
+            errors before and after); `summary`, the scores' part of the refinement; `lights`, maps, are shown elsewhere.
     """
     views, summary, rows = page["views"], page["summary"], []
     scores = np.array([[psnr(view["pictures"][i], view["pictures"][0]) for i in (1, 2)] for view in views])
@@ -244,7 +243,7 @@ def refinement_section(page: Mapping) -> dict:
         rows.append(
             ("all photos: coverage at the outline, mean squared error", *(f"{v:.2g}" for v in summary["outline_error"]))
         )
-    name = "all photos: colours inside the outline, PSNR before the first step and before the last one"
+    name = "all photos: colours inside the outline, PSNR before the first and the last step"
     rows.append((name, *(f"{v:.2f} dB" for v in summary["photos_psnr"])))
     best = f"step {summary['delivered']} is delivered" if summary["delivered"] else "no step helped, none is delivered"
     best += "; a smeared lamp was made compact first" if summary["lamp"] else ""
@@ -272,8 +271,7 @@ def refinement_section(page: Mapping) -> dict:
 def embedded_light(name: str, radiance: np.ndarray) -> dict:
     """A light [h, w, 3] for the page: a picture at its own exposure, and 256 x 128 texels as packed halves."""
     radiance = np.nan_to_num(np.asarray(radiance, np.float32))
-    small = resize_environment(radiance, ROWS, 2 * ROWS)
-    width, height, content = as_halves(small)
+    width, height, content = as_halves(small := resize_environment(radiance, ROWS, 2 * ROWS))
     white = white_of(radiance)
     return {
         "name": name,
