@@ -1,9 +1,9 @@
 """Mutation testing: changes a source file in one place after the other and runs the fast tests that concern it each time.
 
-    python tests/mutants.py [--some N] python/splitnerf/training/schedule.py python/splitnerf/refinement ...
+    python tests/mutants.py [--some N] [--out PAGE.md] python/splitnerf/training/schedule.py python/splitnerf/refinement ...
 
 A folder is all of its files; --some takes N changes of each argument, chosen at random with seed 0. A change that no test sees is printed as
-a diff, and in the end there is a line for each argument.
+a diff, and in the end there is a line for each argument, also as a page.
 cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
 """
 
@@ -19,6 +19,8 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+
+from splitnerf_tools.bench.provenance import header, provenance
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = Path("python")
@@ -175,7 +177,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
     parser.add_argument("--some", type=int, metavar="N", help="mutants of each argument (default: all)")
-    options, table = parser.parse_args(), []
+    parser.add_argument("--out", type=Path, metavar="FILE.md", help="where the table is written as a page")
+    options, table = parser.parse_args(), ["| package | places | changed | seen by a test |", "|---|---|---|---|"]
+    facts = provenance(tuple(map(str, options.paths)))
     for path in options.paths:
         made = {file: mutants_of(file) for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])}
         every = [(file, name) for file, (_, _, names) in made.items() for name in names]
@@ -187,8 +191,10 @@ def main() -> None:
                 run, left = mutate(file, session, settings, names)
                 print("\n".join([f"{file}: {run} mutants, {run - len(left)} killed", *left]), flush=True)
                 n, n_left = n + run, n_left + len(left)
-        table.append(f"{path}: {len(every)} mutants, {n} tried, {n - n_left} killed")
+        table.append(f"| {path.relative_to(PACKAGES)} | {len(every)} | {n} | {n - n_left} |")
     print("\n".join(table))
+    if options.out:
+        options.out.write_text("\n".join(["# Changes that tests see", "", header(facts), "", *table, ""]))
 
 
 if __name__ == "__main__":
