@@ -9,6 +9,7 @@
     skips     training with and without what a step leaves out, by equal time and by equal steps
     paper     the published method with all its steps and 1/64 of its samples, beside preset cpu; hours
     ablation  what each part of the method is worth behind the refinement, by equal steps (splitnerf ablate); hours
+    step, hash_grid, shading, split_sum, prefilter, occlusion, stability   by programs of their own
 
 Renders what has to be rendered into WORK, trains, and scores what training alone exports and what the refinement delivers.
 Each run becomes rows of PAGE.csv as soon as it ends; the command goes on where it was interrupted. Rows of other minutes or
@@ -45,10 +46,8 @@ from splitnerf_tools.synth.shapes import MATERIALS, SHAPES
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bench.kinds import KINDS  # noqa: E402
+from bench.programs import DATA, PROGRAMS, ROOT, SOURCES, is_fresh, run_program, splitnerf  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))
-SOURCES = "cpp", "python/splitnerf", ":!cpp/cuda", ":!python/splitnerf/cli"
 SCORES = {  # column: the evaluation's keys, digits
     "relit, dB": (("relight", "psnr"), 1),
     "albedo, dB": (("albedo", "psnr"), 1),
@@ -86,14 +85,8 @@ SETTINGS: dict[str, tuple] = {  # by name: words of `splitnerf train`
     **{f"without: {name}": with_settings(ALONE, offs) for name, offs in SKIPS.items()},
     "no skips": with_settings(ALONE, tuple(off for offs in SKIPS.values() for off in offs)),
 }
-STEPS_TAKE = {"paper": 570, "ablation": 128}  # minutes of the runs that steps end, on two cores; others: 3
-ABLATED = "boombox", "corset"
+STEPS_TAKE = {"paper": 570, "ablation": 128, "stability": 60}  # minutes on two cores; other programs and runs: 3
 MOST_LINES = 9  # of a page's table; a longer one lists what runs deliver, and its CSV file has the rest
-ABLATION = (
-    *("--steps", 6000, "--downscale", 2, "--views", 6, "--spp", 32, "--rows"),
-    "no refinement; MLP light; light by the split sum; no indirect light; no neutral light; no smoothness of normals; "
-    "no material entropy",
-)
 KEYS = ("scene", "settings", "minutes", "seed", "images", "threads", "asset")
 COLUMNS = (*KEYS, *SCORES, "seconds", "kernels", "commit", "date")
 HARD = {  # the light of the photos; three others relight it
@@ -168,12 +161,7 @@ PAGES = {
         steps=20000,
     ),
 }
-NAMES = *PAGES, "ablation"
-
-
-def splitnerf(*words: object) -> bool:
-    """Runs a command of the program; returns whether it succeeded."""
-    return subprocess.run([sys.executable, "-m", "splitnerf", *map(str, words)]).returncode == 0
+NAMES = *PAGES, *PROGRAMS
 
 
 def data_of(scene: str, size: int, work: Path) -> Path | None:
@@ -363,30 +351,6 @@ def mean_of(rows: list[Row], column: str) -> str:
     return f"{sum(found) / len(found):.{SCORES[column][1]}f}" if found else "-"
 
 
-def write_ablation(out: Path, work: Path) -> bool:
-    """Runs the ablation and writes its page; whether it succeeded."""
-    scenes, folder, facts = [DATA / "scenes" / name for name in ABLATED], work / "ablation", provenance(SOURCES)
-    if not all(map(Path.is_dir, scenes)) or not splitnerf("ablate", *scenes, "--out", folder, *ABLATION):
-        return False
-    facts |= {"command": "`make results PAGE=ablation`"}
-    (out / "ablation.csv").write_bytes((folder / "ablation.csv").read_bytes())
-    words = " ".join(map(str, ABLATION[:-1]))
-    lines = [
-        "# Ablation",
-        "",
-        header(facts),
-        "",
-        f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included.",
-        "One run a row, so less than 0.3 dB is no difference; minutes are as the machine had time. [Ablation](../ablation.md) says what",
-        "the rows mean.",
-        "",
-        (folder / "ablation.md").read_text(),
-    ]
-    with atomic_path(out / "ablation.md") as temporary:
-        temporary.write_text("\n".join(lines))
-    return True
-
-
 def place(row: Row, page: Page) -> tuple:
     """By which the rows of a page are sorted."""
     at = page.scenes.index(row["scene"]) if row["scene"] in page.scenes else len(page.scenes)
@@ -443,15 +407,11 @@ def key_of(row: Row) -> tuple:
     return tuple(row[key] for key in KEYS[:4])
 
 
-def taken(settings: str, minutes: float) -> float:
-    """The minutes that a training takes."""
-    return minutes or STEPS_TAKE.get(settings, 3)
-
-
 def missing(name: str, args: argparse.Namespace) -> Iterator[tuple[str, str, float, int]]:
     """Scene, settings, minutes and seed of each run that a page lacks."""
-    if name == "ablation":
-        yield "8 rows of 2 scenes", "ablation", 0, 0
+    if name in PROGRAMS:
+        if args.again or not is_fresh(args.out / f"{name}.md"):
+            yield "by a program of its own", name, 0, 0
         return
     page, there = PAGES[name], set(map(key_of, () if args.again else read_rows(args.out / f"{name}.csv")))
     for seed in range(page.seeds):
@@ -476,16 +436,14 @@ def main() -> int:
         parser.error(f"unknown page {unknown[0]}; there are {', '.join(NAMES)}")
     args.work.mkdir(parents=True, exist_ok=True)
     runs = [(name, *run) for name in args.pages or NAMES for run in missing(name, args)]
-    for name, scene, settings, minutes, seed in runs if args.list else ():
-        print(f"{name}: {scene}, {settings}, {taken(settings, minutes):g} minutes, seed {seed}")
-    print(
-        f"{sum(taken(settings, minutes) for _, _, settings, minutes, _ in runs):g} minutes of training are missing",
-        flush=True,
-    )
+    takes = [minutes or STEPS_TAKE.get(settings, 3) for _, _, settings, minutes, _ in runs]
+    for (name, scene, settings, _, seed), minutes in zip(runs, takes) if args.list else ():
+        print(f"{name}: {scene}, {settings}, {minutes:g} minutes, seed {seed}")
+    print(f"{sum(takes):g} minutes are missing", flush=True)
     failed = False
     for name, scene, settings, minutes, seed in () if args.list else runs:
-        if name == "ablation":
-            failed |= not write_ablation(args.out, args.work)
+        if name in PROGRAMS:
+            failed |= not run_program(name, args.out, args.work)
             continue
         found = rows_of(scene, settings, minutes, seed, PAGES[name], args.work, args.blender)
         failed |= not found

@@ -70,10 +70,9 @@ struct Case {
 
 template <class T> void check_network(double tolerance) {
   const Case c;
-  const std::vector<T> table(c.table.begin(), c.table.end()), hidden(c.hidden.begin(), c.hidden.end());
-  const std::vector<T> bias(c.bias.begin(), c.bias.end()), out(c.out.begin(), c.out.end());
+  const auto as = [](const std::vector<double>& x) { return std::vector<T>(x.begin(), x.end()); };
+  const auto table = as(c.table), hidden = as(c.hidden), bias = as(c.bias), out = as(c.out), at = as(c.positions);
   const T out_bias = T(0.25);
-  const std::vector<T> positions(c.positions.begin(), c.positions.end());
   for (const Kernels<T>& kernels : usable_kernels<T>()) {
     for (int n_active : {0, 2, 3}) {
       const PreparedSdfLayer<T> layer(
@@ -81,7 +80,7 @@ template <class T> void check_network(double tolerance) {
       const SdfNetwork<T> net{{c.levels.data(), 2, 3, n_active, 0, nullptr, table.data()}, layer.layer()};
       for (int64_t n : {0, 1, 7, kSdfBlock}) {
         std::vector<T> work(sdf_work_size(net.layer)), values(n + 1, T(-77));
-        kernels.sdf_values(net, n, positions.data(), work.data(), values.data());
+        kernels.sdf_values(net, n, at.data(), work.data(), values.data());
         for (int64_t p = 0; p < n; ++p)
           EXPECT_NEAR(values[p], c.expected(p, n_active), tolerance) << kernels.name << " " << p;
         EXPECT_EQ(values[n], T(-77)) << "wrote past the points";
