@@ -33,6 +33,7 @@ TESTS = {
     "devices.py": "test_device.py test_doctor.py test_refreshes.py test_train.py",
     "errors.py": "test_refusals.py test_bad_files.py",
     "evaluate/": "test_evaluate.py test_metrics.py test_lpips.py",
+    "evaluate/score_table.py": "test_evaluate.py test_report.py test_ablate.py",
     "export/": "test_export.py test_bake.py test_meshing.py",
     "files.py": "test_files.py test_own_files.py",
     "fields/": "test_shading_model.py test_views.py",
@@ -179,7 +180,6 @@ def main() -> None:
     parser.add_argument("--some", type=int, metavar="N", help="mutants of each argument (default: all)")
     parser.add_argument("--out", type=Path, metavar="FILE.md", help="where the table is written as a page")
     options, table = parser.parse_args(), ["| package | places | changed | seen by a test |", "|---|---|---|---|"]
-    facts = provenance(tuple(map(str, options.paths)))
     for path in options.paths:
         made = {file: mutants_of(file) for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])}
         every = [(file, name) for file, (_, _, names) in made.items() for name in names]
@@ -194,7 +194,8 @@ def main() -> None:
         table.append(f"| {path.relative_to(PACKAGES)} | {len(every)} | {n} | {n - n_left} |")
     print("\n".join(table))
     if options.out:
-        options.out.write_text("\n".join(["# Changes that tests see", "", header(facts), "", *table, ""]))
+        head = "# Changes that tests see", "", header(provenance(tuple(map(str, options.paths)))), ""
+        options.out.write_text("\n".join([*head, *table, ""]))
 
 
 if __name__ == "__main__":

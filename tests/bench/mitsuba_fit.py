@@ -2,9 +2,10 @@
 
     python tests/bench/mitsuba_fit.py RUN DATA OUT --minutes 5 [--spp 16] [--rate 0.002]
 
-Needs `pip install mitsuba` and an LLVM library. Begins where the refinement of RUN began, at RUN/trained: mesh, textures and
-light. Each step renders one photo by `prb` (paths of at most four segments) and moves albedo, roughness, metallic and the light by Adam.
-Writes OUT/mesh.glb and OUT/environment.exr, for `splitnerf evaluate OUT/mesh.glb --data DATA`; the normal map is left out.
+Needs `pip install mitsuba` and an LLVM library (Mitsuba 3.9: not 14, 19 works). Begins where the refinement of RUN began, at
+RUN/trained: mesh, textures and light. Each step renders one photo by `prb` (paths of at most four segments) and moves albedo,
+roughness, metallic and the light by Adam. Writes OUT/mesh.glb and OUT/environment.exr, for `splitnerf evaluate OUT/mesh.glb
+--data DATA`; the normal map is left out.
 """
 
 import argparse

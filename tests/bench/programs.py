@@ -14,7 +14,6 @@ from bench import tables  # noqa: E402
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))
 SOURCES = "cpp", "python/splitnerf", ":!cpp/cuda", ":!python/splitnerf/cli"
-ABLATED = "boombox", "corset"
 ABLATION = (
     *("--steps", 6000, "--downscale", 2, "--views", 6, "--spp", 32, "--rows"),
     "no refinement; MLP light; light by the split sum; no indirect light; no neutral light; no smoothness of normals; "
@@ -56,10 +55,10 @@ def run_program(name: str, out: Path, work: Path) -> bool:
 
 def write_ablation(out: Path, work: Path) -> bool:
     """Runs the ablation and writes its page; whether it succeeded."""
-    scenes, folder, facts = [DATA / "scenes" / name for name in ABLATED], work / "ablation", provenance(SOURCES)
+    scenes, folder = (DATA / "scenes/boombox", DATA / "scenes/corset"), work / "ablation"
+    facts = provenance(SOURCES, "make results PAGE=ablation")  # before, as the sources may change meanwhile
     if not all(map(Path.is_dir, scenes)) or not splitnerf("ablate", *scenes, "--out", folder, *ABLATION):
         return False
-    facts |= {"command": "`make results PAGE=ablation`"}
     (out / "ablation.csv").write_bytes((folder / "ablation.csv").read_bytes())
     words = " ".join(map(str, ABLATION[:-1]))
     lines = [

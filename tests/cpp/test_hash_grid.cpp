@@ -68,8 +68,7 @@ template <class T> void every_set_agrees_with_base() {
   }
 }
 
-TEST(HashKernels, EverySetAgreesWithBaseInFloat) { every_set_agrees_with_base<float>(); }
-TEST(HashKernels, EverySetAgreesWithBaseInDouble) { every_set_agrees_with_base<double>(); }
+TEST(HashKernels, SetsAgreeWithBase) { every_set_agrees_with_base<float>(), every_set_agrees_with_base<double>(); }
 
 }  // namespace
 }  // namespace splitnerf

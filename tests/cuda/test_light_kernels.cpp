@@ -93,10 +93,8 @@ template <class T> void check_lookup(int64_t n, double tolerance) {
   cuda_on_cpu::take_counts();
   cuda::light_lookup_backward(gpu.queue(), p, n, dirs.data(), rho.data(), g.data(), to_dirs1.data(), to_rho1.data(),
                               to_levels1.data(), to_sh1.data());
-  const cuda_on_cpu::Counts counts =
-      cuda_on_cpu::take_counts();  // four texels of two levels at most, in three channels
-  EXPECT_LE(counts.atomics, 24 * n + 3 * kShCoefficients * std::min<int64_t>((n + 31) / 32, 1024));
-  EXPECT_EQ(counts.launches, n > 0);
+  EXPECT_LE(cuda_on_cpu::take_counts().atomics,  // four texels of two levels at most, in three channels
+            24 * n + 3 * kShCoefficients * std::min<int64_t>((n + 31) / 32, 1024));
   expect_near(radiance1, radiance, tolerance), expect_near(to_dirs1, to_dirs, 10 * tolerance);
   expect_near(to_rho1, to_rho, 10 * tolerance);
   expect_near(to_levels1, to_levels, tolerance), expect_near(to_sh1, to_sh, tolerance);

@@ -14,7 +14,7 @@ from splitnerf.data.images import area_average
 from splitnerf.export.bake import rasterise
 from splitnerf.refinement.detail import WINDOW, FineTexels, Windows, detail_size, scattered_light, with_detail
 from splitnerf.refinement.fit import FitSettings
-from splitnerf.refinement.refine import without_detail
+from splitnerf.refinement.refine import with_normal_texture, without_detail
 from splitnerf.refinement.stage import Stage
 
 SIZE, FINE = 256, 2  # texels of the fit, by which the true texture is larger
@@ -119,3 +119,6 @@ def test_a_refinement_delivers_it(painted, most):
     again = without_detail(delivered)
     assert albedo_of(again).shape == (before, before, 3)
     assert np.allclose(albedo_of(again).mean(), albedo_of(delivered).mean(), atol=1e-4)
+    plain = replace(delivered, tangents=None, materials=[replace(delivered.materials[0], normal_texture=None)])
+    straight = with_normal_texture(plain)  # as where photos showed nothing of the normals
+    assert (straight.materials[0].normal_texture == [0, 0, 1]).all() and np.allclose(straight.tangents, asset.tangents)
