@@ -21,15 +21,15 @@ ABLATION = (
 )
 PROGRAMS: dict[str, tuple] = {  # by page: what Python is called with, before the folder of the pages
     "ablation": (),
-    "step": (ROOT / "tests/bench/step.py",),
-    **{name: (ROOT / "tests/bench/operators.py", name) for name in ("hash_grid", "shading", "split_sum")},
+    "step": ("tests/bench/step.py",),
+    **{name: ("tests/bench/operators.py", name) for name in ("hash_grid", "shading", "split_sum")},
     **{name: ("-m", "splitnerf", "bench", name) for name in ("prefilter", "occlusion")},
     "stability": ("-m", "stability", "--jobs", os.cpu_count()),
 }
 
 
 def splitnerf(*words: object) -> bool:
-    """Runs a command of the program; returns whether it succeeded."""
+    """Runs a command of the program; whether it succeeded."""
     return subprocess.run([sys.executable, "-m", "splitnerf", *map(str, words)]).returncode == 0
 
 
@@ -42,21 +42,21 @@ def run_program(name: str, out: Path, work: Path) -> bool:
     """Writes a page of :data:`PROGRAMS`; whether that succeeded."""
     if name == "ablation":
         return write_ablation(out, work)
-    words = [*PROGRAMS[name], "--out", out]
+    words, folder, run = [*PROGRAMS[name]], out.resolve(), work.resolve() / "runs/boombox_cpu_8_0"
     if name == "step":
-        run = work / "runs/boombox_cpu_8_0"
+        words += [run, DATA / "scenes/boombox"]
         if not run.is_dir():
             print(f"step: {run} is missing; PAGE=time makes it", file=sys.stderr)
             return False
-        words = [*PROGRAMS[name], run, DATA / "scenes/boombox", "--out", out / "step.md"]
+    if folder != ROOT / "docs/benchmarks":  # a page's head has the command without what is usual
+        words += ["--out", folder / "step.md" if name == "step" else folder]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tests")}
-    return subprocess.run([sys.executable, *map(str, words)], env=environment).returncode == 0
+    return subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=environment).returncode == 0
 
 
 def write_ablation(out: Path, work: Path) -> bool:
     """Runs the ablation and writes its page; whether it succeeded."""
     scenes, folder = (DATA / "scenes/boombox", DATA / "scenes/corset"), work / "ablation"
-    facts = provenance(SOURCES, "make results PAGE=ablation")  # before, as the sources may change meanwhile
     if not all(map(Path.is_dir, scenes)) or not splitnerf("ablate", *scenes, "--out", folder, *ABLATION):
         return False
     (out / "ablation.csv").write_bytes((folder / "ablation.csv").read_bytes())
@@ -64,7 +64,7 @@ def write_ablation(out: Path, work: Path) -> bool:
     lines = [
         "# Ablation",
         "",
-        header(facts),
+        header(provenance(SOURCES, "make results PAGE=ablation")),
         "",
         f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included.",
         "One run a row, so less than 0.3 dB is no difference; minutes are as the machine had time. [Benchmarks](README.md)",
