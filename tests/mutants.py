@@ -29,6 +29,7 @@ TESTS = {
     "cli/": "test_commands.py test_refusals.py test_train.py test_evaluate.py test_own_files.py test_report.py",
     "config/": "test_config.py",
     "data/": "test_data.py test_layouts.py test_inputs.py test_known_pixels.py test_images.py test_photos.py test_pixels.py",
+    "data/colours.py": "test_colours.py test_images.py test_inputs.py",
     "data/gltf/": "test_gltf.py",
     "devices.py": "test_device.py test_doctor.py test_refreshes.py test_train.py",
     "errors.py": "test_refusals.py test_bad_files.py",

@@ -57,6 +57,7 @@ def run_program(name: str, out: Path, work: Path) -> bool:
 def write_ablation(out: Path, work: Path) -> bool:
     """Runs the ablation and writes its page; whether it succeeded."""
     scenes, folder = (DATA / "scenes/boombox", DATA / "scenes/corset"), work / "ablation"
+    head = header(provenance(SOURCES, "make results PAGE=ablation"))  # before, as the sources may change meanwhile
     if not all(map(Path.is_dir, scenes)) or not splitnerf("ablate", *scenes, "--out", folder, *ABLATION):
         return False
     (out / "ablation.csv").write_bytes((folder / "ablation.csv").read_bytes())
@@ -64,7 +65,7 @@ def write_ablation(out: Path, work: Path) -> bool:
     lines = [
         "# Ablation",
         "",
-        header(provenance(SOURCES, "make results PAGE=ablation")),
+        head,
         "",
         f"`splitnerf ablate boombox corset {words} ...`: each row has the same steps, the refinement included.",
         "One run a row, so less than 0.3 dB is no difference; minutes are as the machine had time. [Benchmarks](README.md)",

@@ -19,8 +19,7 @@ template <class T> void check_exp(double tolerance) {
   EXPECT_LT(exp_of_minus(std::numeric_limits<T>::infinity()), T(1e-37));
   EXPECT_TRUE(std::isnan(exp_of_minus(std::numeric_limits<T>::quiet_NaN())));
 }
-TEST(VectorMath, ExpFloat) { check_exp<float>(3e-7); }
-TEST(VectorMath, ExpDouble) { check_exp<double>(5e-16); }
+TEST(VectorMath, Exp) { check_exp<float>(3e-7), check_exp<double>(5e-16); }
 
 template <class T> void check_log(double tolerance) {
   for (int i = 1; i <= 100000; ++i) {
@@ -30,8 +29,7 @@ template <class T> void check_log(double tolerance) {
   EXPECT_EQ(log1p_of_unit(T(0)), T(0));
   EXPECT_NEAR(log1p_of_unit(T(1e-30)) / T(1e-30), 1.0, tolerance);
 }
-TEST(VectorMath, LogFloat) { check_log<float>(3e-7); }
-TEST(VectorMath, LogDouble) { check_log<double>(5e-16); }
+TEST(VectorMath, Log) { check_log<float>(3e-7), check_log<double>(5e-16); }
 
 // A small network with drawn weights, and the same by the plain formula.
 struct Case {
