@@ -3,7 +3,7 @@
     python tests/mutants.py [--some N] [--out PAGE.md] python/splitnerf/training/schedule.py python/splitnerf/refinement ...
 
 A folder is all of its files; --some takes N changes of each argument, chosen at random with seed 0. A change that no test sees is printed as
-a diff, and in the end there is a line for each argument, also as a page.
+a diff; each argument has a row in the end, also in the page.
 cosmic-ray writes each change into the file itself and takes it back; so the file must have no changes that are not committed.
 """
 
@@ -20,10 +20,16 @@ import subprocess
 import sys
 from pathlib import Path
 
-from splitnerf_tools.bench.provenance import header, provenance
+from splitnerf_tools.bench.provenance import provenance
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = Path("python")
+PAGE = """# Changes that tests see
+
+`python tests/mutants.py --some N --out docs/mutants.md PACKAGE ...` changes N places of a package's sources, chosen at random, and asks its fast tests.
+
+| package | places | changed | seen by a test | commit | date |
+|---|---|---|---|---|---|"""
 # The fast tests of each file, by the longest beginning of its path below python/ or python/splitnerf/ that is listed.
 TESTS = {
     "cli/": "test_commands.py test_refusals.py test_train.py test_evaluate.py test_own_files.py test_report.py",
@@ -179,8 +185,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
     parser.add_argument("--some", type=int, metavar="N", help="mutants of each argument (default: all)")
-    parser.add_argument("--out", type=Path, metavar="FILE.md", help="where the table is written as a page")
-    options, table = parser.parse_args(), ["| package | places | changed | seen by a test |", "|---|---|---|---|"]
+    parser.add_argument("--out", type=Path, metavar="FILE.md", help="a page whose rows are replaced")
+    options = parser.parse_args()
     for path in options.paths:
         made = {file: mutants_of(file) for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path])}
         every = [(file, name) for file, (_, _, names) in made.items() for name in names]
@@ -192,11 +198,13 @@ def main() -> None:
                 run, left = mutate(file, session, settings, names)
                 print("\n".join([f"{file}: {run} mutants, {run - len(left)} killed", *left]), flush=True)
                 n, n_left = n + run, n_left + len(left)
-        table.append(f"| {path.relative_to(PACKAGES)} | {len(every)} | {n} | {n - n_left} |")
-    print("\n".join(table))
-    if options.out:
-        head = "# Changes that tests see", "", header(provenance(tuple(map(str, options.paths)))), ""
-        options.out.write_text("\n".join([*head, *table, ""]))
+        facts = provenance((str(path),))
+        row = f"| {path.relative_to(PACKAGES)} | {len(every)} | {n} | {n - n_left} | {facts['commit']} | {facts['date']} |"
+        print(row, flush=True)
+        if options.out:  # in place of an older row
+            old = options.out.read_text().splitlines() if options.out.is_file() else []
+            kept = [x for x in old if x.startswith("| splitnerf") and x.split(" |")[0] != row.split(" |")[0]]
+            options.out.write_text("\n".join([PAGE, *sorted([*kept, row]), ""]))
 
 
 if __name__ == "__main__":
