@@ -32,8 +32,6 @@ TEST(HashIndex, KernelsReachEntriesPastTwoToThe32) {
   munmap(memory, bytes);
 }
 
-// ---- instruction sets ----
-
 // Fused multiply-adds round the position inside a cell differently: close relative to the largest value.
 template <class T> void every_set_agrees_with_base() {
   const std::vector<Kernels<T>> sets = usable_kernels<T>();

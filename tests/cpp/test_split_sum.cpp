@@ -74,8 +74,6 @@ TEST(BrdfTable, NeverGainsEnergy) {
   }
 }
 
-// ---- shading ----
-
 ShadePoint<double> white_point(Random& random) {
   const Vec3<double> one{1, 1, 1};
   return {random.direction(), random.direction(), one, random.uniform(), 0, one, one, one, one, {}, {}};

@@ -53,8 +53,6 @@ TEST(LightKernels, PartsCoverTheList) {
   EXPECT_EQ(lobe_parts(1 << 20, 8192), 1);
 }
 
-// ---- the light's pyramid ----
-
 template <class T> struct Pyramid {
   std::vector<T> levels, sh, zonal;
   LightPyramid<T> view{};

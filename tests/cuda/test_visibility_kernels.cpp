@@ -7,8 +7,6 @@
 namespace splitnerf {
 namespace {
 
-// ---- the visibility cache ----
-
 // n vertices of a ball that see some directions open, some blocked, and know nothing of the others.
 struct Ball {
   static constexpr int64_t k = 64, levels = 2, buckets = 64;
