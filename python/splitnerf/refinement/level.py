@@ -46,7 +46,7 @@ def tint_of_light(values: Tensor) -> Tensor:
 def evidence(level: float, tint: list[float]) -> list[str]:
     """What tells the level and the tint of the light of a run, in sentences; docs/results.md has the errors."""
     told = [
-        "no highlight tells how bright the light is: where photos do not show it, albedo and light may be off by a tenth, at worst by a third"
+        "no highlight tells how bright the light is; unless photos show the light itself, albedo and light may be off by a tenth, at worst by a third"
         if level == 1
         else f"the light was made {level:.2f} times as bright, as highlights ask"
     ]
