@@ -28,7 +28,7 @@ STABILITY_OPTIONS ?=
 CACHED = CXX=$${CXX:-c++} CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache || true) CMAKE_CUDA_COMPILER_LAUNCHER=$$(command -v ccache || true)
 CMAKE_TESTS = $(CACHED) $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DSPLITNERF_BUILD_PYTHON=OFF -DSPLITNERF_BUILD_TESTS=ON
 PAGE ?=
-EXTRAS := batch_on_ray export relight progress photos view_page report_page training_page three_page
+EXTRAS := docs batch_on_ray export relight progress photos view_page report_page training_page three_page
 READERS := json colmap neus png exr hdr glb checkpoint
 
 .PHONY: demo test lint format budget test-slow install system gtest sanitize faults fuzz stability tables pytest mutants viewer docs figures results lock test-extras wheels clean
@@ -108,7 +108,7 @@ test-slow: install
 	$(BIN)/python -m pytest -q -m slow
 
 test-extras: install viewer
-	$(BIN)/python -m pip install --quiet -e '.[batch,usd,video,tensorboard,heic,raw]' --no-build-isolation
+	$(BIN)/python -m pip install --quiet -e '.[batch,usd,video,tensorboard,heic,raw,docs]' --no-build-isolation
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) -rs $(EXTRAS:%=tests/python/test_%.py)
 
 system:

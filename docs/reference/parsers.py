@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from splitnerf import cli
-from splitnerf.cli.common import TITLE, examples_in
+from splitnerf.cli.common import TITLE
 
 
 def documented() -> argparse.ArgumentParser:
@@ -13,7 +13,8 @@ def documented() -> argparse.ArgumentParser:
     parser = cli.build_parser()
     commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
     for command in commands.choices.values():
-        paragraph, lines = (command.epilog or "").partition(TITLE)[0].strip(), examples_in(command.epilog)
-        block = ["Examples:", "", ".. code-block:: console", "", *(f"   $ {line}" for line in lines)] if lines else []
-        command.epilog = "\n".join([paragraph, "", *block])
+        paragraph, _, lines = (command.epilog or "").partition(TITLE)
+        block = [f"   $ {line.strip()}" for line in lines.splitlines() if line.strip()]
+        block = ["Examples:", "", ".. code-block:: console", "", *block] if block else []
+        command.epilog = "\n".join([paragraph.strip(), "", *block])
     return parser

@@ -356,10 +356,10 @@ def sample_rays(
     max_samples: int = 1024,
     capacity: int = 0,
 ) -> tuple[PackedSamples, Tensor, Tensor]:
-    """The samples of :func:`march_rays` that contribute to a pixel; the search evaluates the distance along the rays.
+    """The samples of :func:`splitnerf.ops.rays.march_rays` that contribute to a pixel; the search evaluates the distance along the rays.
 
     Two neighbouring samples are kept where one of them may have a rendering weight above `min_weight`. The weight is
-    that of :func:`surface_weights` with the slope between their midpoints, or a bound for a surface between the
+    that of :func:`splitnerf.ops.rays.surface_weights` with the slope between their midpoints, or a bound for a surface between the
     midpoints. The ray ends where the transmittance is below `min_transmittance`. After a sample at distance f the
     search skips the samples within ``(|f| - reach) / lipschitz``. Where it then meets density or the other sign, the
     field is steeper than `lipschitz`: the search goes back and looks at what it skipped. It does that 32 times on a ray
@@ -369,11 +369,11 @@ def sample_rays(
     Args:
         rays_o, rays_d: [n_rays, 3] origins (scene units) and unit directions.
         jitter: [n_rays] offsets of each ray's lattice of samples in [0, 1), as shares of the step.
-        cells: [r, r, r] uint8 cells as in :func:`march_rays`; they cover the network's box.
+        cells: [r, r, r] uint8 cells as in :func:`splitnerf.ops.rays.march_rays`; they cover the network's box.
         network: The distance field.
         step: The length of a sample, scene units.
         s: The sharpness of the density, positive.
-        anneal: The annealing of the cosine in [0, 1], see :func:`surface_weights`.
+        anneal: The annealing of the cosine in [0, 1], see :func:`splitnerf.ops.rays.surface_weights`.
         min_weight: The rendering weight above which samples are kept, in [0, 1).
         min_transmittance: The transmittance at which a ray ends, in [0, 1).
         reach: The distance outside the surface beyond which the density vanishes, scene units.
