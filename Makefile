@@ -36,7 +36,7 @@ READERS := json colmap neus png exr hdr glb checkpoint
 demo: install
 	$(BIN)/splitnerf demo
 
-# Tests compile the GPU's kernels wherever they can; a build for use alone does so where there is a GPU.
+# A clone that is built for its tests has the GPU's kernels wherever there is nvcc; one that is built for use, where there is a GPU, too.
 test: CUDA := $(if $(shell command -v nvcc),-C cmake.define.SPLITNERF_CUDA=ON)
 test: install lint budget tables gtest pytest
 

@@ -5,11 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from bench import tables
 from splitnerf.files import atomic_path
 from splitnerf_tools.bench.provenance import header, provenance
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from bench import tables  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("SPLITNERF_DATA", ROOT.parent / "shared/data"))

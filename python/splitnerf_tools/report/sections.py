@@ -230,7 +230,7 @@ def refinement_section(page: Mapping) -> dict:
 
     Args:
         page: `views`, each with `name`, `pictures` (photo, before and after, [H, W, 3] sRGB on white), and `coverage` (mean squared
-            errors before and after); `summary`, the scores' part of the refinement; `lights`, maps, are shown elsewhere.
+            errors before and after); `summary`, the scores' part of the refinement; `lights`, linear maps [h, w, 3], go to the lights.
     """
     views, summary, rows = page["views"], page["summary"], []
     scores = np.array([[psnr(view["pictures"][i], view["pictures"][0]) for i in (1, 2)] for view in views])
