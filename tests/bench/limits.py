@@ -1,12 +1,15 @@
 """The swap table: what limits a reconstructed asset. Its parts are replaced by the truth, and each variant is scored.
 
-    python tests/bench/limits.py RUN SCENE [--views 2] [--spp 32] [--texture 2048] [--downscale 1] [--out table.md]
+    python tests/bench/limits.py RUN SCENE [--views 2] [--spp 32] [--texture 2048] [--downscale 1] [--sweeps 0] [--out table.md]
 
 RUN is a run's folder or a GLB file with the recovered light in its folder; SCENE a dataset with the truth as asset.glb,
 light.hdr and relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
 
 The first and the last row are the files as they are; between them parts come from the nearest points of the other
 surface (tests/bench/swap.py). `all true` is the limit by noise and by the data's own renderer.
+
+With --sweeps N rows follow that say what the refinement makes of starts that are true in part: whether it stays at the
+truth, and whether a true part pulls the rest along. No outline is fitted, and all N sweeps are made.
 """
 
 import argparse
@@ -24,6 +27,8 @@ from splitnerf.data.truth import OPAQUE, ViewTruth, load_scene_truth, load_view_
 from splitnerf.evaluate import metrics, scoring
 from splitnerf.evaluate.protocol import ScaledView, evaluate_maps, on_white, scaled_scores
 from splitnerf.evaluate.scoring import Protocol, RelitViews, asset_predictions, choose_views, relight, relight_scores
+from splitnerf.refinement.fit import FitSettings
+from splitnerf.refinement.stage import Stage
 from splitnerf.relight.rendering import asset_of
 from splitnerf.render.path_traced import AssetRenderer
 from splitnerf_tools.bench.provenance import header, provenance
@@ -39,7 +44,8 @@ ROWS = (
     *((f"all true but {part}", {*PARTS, "mesh"} - {part}) for part in (*PARTS, "mesh")),
     ("all true", (*PARTS, "mesh")),
 )
-SOURCES = ("tests/bench/limits.py", "tests/bench/swap.py", "python/splitnerf/evaluate")
+STARTS = ("ours", "true mesh", "true normals", "true materials", "true light", "all true")
+SOURCES = ("tests/bench/limits.py", "tests/bench/swap.py", "python/splitnerf/evaluate", "python/splitnerf/refinement")
 QUIET_FLOOR = 1e-5  # least squared error that is told from noise
 COLUMNS = (
     ("relit", "relit, dB"),
@@ -52,6 +58,7 @@ COLUMNS = (
     ("metallic", "metal"),
     ("shading", "shading normals, deg"),
     ("smooth", "mesh's normals, deg"),
+    ("held", "held out, 1e-4"),
 )
 INTRODUCTION = """# What limits the relit images
 
@@ -61,7 +68,8 @@ it; the same less the noise of the paths, which two renderings tell from errors 
 makes of noise; at most 50 dB); and without the factor. Novel: PSNR of the photos under our light and under the true
 one, with one factor per channel too, since light and albedo share a scale. Then the errors of the maps against the
 truth: albedo in dB with one factor per channel, roughness as the mean absolute error, metal as the balanced accuracy,
-normals with and without the normal texture in degrees.
+normals with and without the normal texture in degrees. Rows with sweeps are refined ones; held out is the error of
+photos that the refinement does not fit, before and after it.
 """
 
 
@@ -144,6 +152,15 @@ class Scene:
         return scaled_scores(lambda: views)[0]["psnr"]
 
 
+def refined(photos: Dataset, asset: Asset, light: np.ndarray, sweeps: int) -> tuple[Asset, str]:
+    """What sweeps of the refinement make of an asset and a light, and the errors of photos held out before and after them."""
+    stage = Stage(photos, asset, light, FitSettings(sweeps=sweeps, outline=False, albedo_size=0))
+    while len(stage.sweeps) < sweeps:
+        stage.advance()
+    errors = stage.held_start, stage.sweeps[-1].held
+    return stage.fit.texels.asset_with(stage.fit.maps()), " to ".join(f"{1e4 * error:.2f}" for error in errors)
+
+
 def load_scene(root: Path, light: Path | None, truth: Asset, protocol: Protocol) -> Scene:
     """The scene's views, maps and truth; the true shading normals are rendered."""
     views, maps = choose_views(load_dataset(root, "test", protocol.downscale), protocol)
@@ -153,7 +170,7 @@ def load_scene(root: Path, light: Path | None, truth: Asset, protocol: Protocol)
     return Scene(views, maps, load_view_truths(views), lights, normals, protocol.spp)
 
 
-def section(run: Path, root: Path, protocol: Protocol, texture: int) -> str:
+def section(run: Path, root: Path, protocol: Protocol, texture: int, sweeps: int = 0) -> str:
     """The scene's table as markdown, its rows printed as they come."""
     ours, truth = asset_of(run), read_asset(root / "asset.glb")
     scene = load_scene(root, scoring.environment_beside(run / "mesh.glb" if run.is_dir() else run), truth, protocol)
@@ -177,14 +194,24 @@ def section(run: Path, root: Path, protocol: Protocol, texture: int) -> str:
             asset = canvases["ours"].painted(replaced)
         lines.append(row(name, scene.scores(asset)))
         print(lines[-1], flush=True)
+    photos, replaced = load_dataset(root, "train", protocol.downscale), dict(ROWS) | {"true light": ()}
+    for name in STARTS if sweeps else ():
+        parts = set(replaced[name])
+        canvas = canvases["true" if "mesh" in parts else "ours"]
+        start = canvas.painted(set(PARTS) - parts if "mesh" in parts else parts)
+        under = scene.lights["novel_true" if name in ("true light", "all true") else "novel"]
+        asset, held = refined(photos, start, under, sweeps)
+        lines.append(row(f"{name}, {sweeps} sweeps", scene.scores(asset) | {"held": held}))
+        print(lines[-1], flush=True)
     text = "\n\n".join(lines[:3]) + "\n" + "\n".join(lines[3:])
     return f"{text}\n\n{header(provenance(SOURCES))}\n"
 
 
-def row(name: str, scores: dict[str, float | None]) -> str:
+def row(name: str, scores: dict[str, float | str | None]) -> str:
     """A line of the table."""
     digits = {"roughness": 3, "metallic": 3}
-    cells = ["" if scores.get(key) is None else f"{scores[key]:.{digits.get(key, 2)}f}" for key, _ in COLUMNS]
+    text = lambda key, value: value if isinstance(value, str) else f"{value:.{digits.get(key, 2)}f}"
+    cells = ["" if scores.get(key) is None else text(key, scores[key]) for key, _ in COLUMNS]
     return f"| {name} | {' | '.join(cells)} |"
 
 
@@ -196,9 +223,10 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--texture", type=int, default=2048, help="texels along an edge of the baked textures")
     parser.add_argument("--downscale", type=int, default=1)
+    parser.add_argument("--sweeps", type=int, default=0, help="of the refinement from starts that are true in part")
     parser.add_argument("--out", type=Path, help="page that the table is appended to")
     args = parser.parse_args()
-    text = section(args.run, args.scene, Protocol(args.downscale, args.views, args.spp), args.texture)
+    text = section(args.run, args.scene, Protocol(args.downscale, args.views, args.spp), args.texture, args.sweeps)
     if args.out is not None:
         before = args.out.read_text() if args.out.is_file() else INTRODUCTION
         args.out.write_text(f"{before}\n{text}")

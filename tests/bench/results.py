@@ -61,6 +61,7 @@ SCORES = {  # column: the evaluation's keys, digits
     "F-score": (("f_score",), 3),
     "steps": (("training", "step"), 0),
     "ms a step": (("training", "ms"), 1),
+    "refinement, seconds": (("refinement", "seconds"), 0),
 }
 SKIPS = {  # what a step leaves out, with the settings that have it done
     "faint samples": ("sampling.min_weight=0",),
@@ -237,7 +238,8 @@ def rows_of(
         threads = os.environ.get("OMP_NUM_THREADS", "all")
         size = SIZES.get(scene, page.size)
         key = dict(zip(KEYS, (scene, settings, f"{minutes:g}", str(seed), str(size), threads, asset)))
-        found = read_json(scores, "novel_view") | {"seconds": read_json(run / "evaluation.json", "seconds")["seconds"]}
+        whole = read_json(run / "evaluation.json", "seconds")
+        found = read_json(scores, "novel_view") | {name: whole.get(name) for name in ("seconds", "refinement")}
         found["training"] = late_steps(run)
         if blender:
             found["blender"] = relit_by_blender(blender, file if file.is_file() else file / "mesh.glb", data, run)

@@ -9,7 +9,7 @@ import pytest
 import torch
 from painted_ball import heights, photos, sky, with_textures
 from splitnerf.data.asset import Asset
-from splitnerf.refinement.fit import FitSettings, Refinement, is_worse
+from splitnerf.refinement.fit import MOST_ERROR, FitSettings, Refinement, is_worse
 from splitnerf.refinement.level import level_of_light
 from splitnerf.refinement.pixels import HELD_OUT, Pixels, held_out
 from splitnerf.refinement.stage import PATIENCE, Stage
@@ -70,6 +70,14 @@ def test_held_out_pixels_are_not_fitted_and_their_error_is_one_number(painted):
     assert fit.held_errors().mean() == error and abs(error) < 1e-3
     fit.unknowns = fit.unknowns + 0.1
     assert fit.held_errors().mean() > 10 * abs(error)
+
+
+def test_a_pixel_that_nothing_explains_decides_nothing(painted):
+    asset, data = painted
+    fit = Refinement(data, asset, sky(), SETTINGS)
+    before, one = fit.held_errors().mean(), fit.held.numbers[len(fit.held.numbers) // 2]
+    fit.pixels.target[one] = 1e3
+    assert 0 < fit.held_errors().mean() - before < 3 * MOST_ERROR / len(fit.held.numbers)
 
 
 def test_few_photos_excuse_more(painted):

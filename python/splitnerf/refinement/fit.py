@@ -63,6 +63,7 @@ LEVEL_MAY_COST = 1.5
 PULL_MAY_COST = 1.01  # likewise: measured 1.00 to 1.01 on a teapot of one metal, to which the pull is worth 1 dB; 1.01 to 1.09 on three others
 SIGMAS = 2.0  # by which errors must be larger than others to be worse
 MIN_TONE = 0.02  # linear value below which errors weigh as at this one
+MOST_ERROR = 0.1  # that a pixel's squared error counts (0.3 of sRGB): the rare ray that finds a lamp by a mirror would decide alone
 
 
 @dataclass(frozen=True)
@@ -115,8 +116,8 @@ class Observed(NamedTuple):
     errors: Tensor  # [b, 2, 3] of the rays' colours
 
     def squared(self) -> Tensor:
-        """[b] squared errors without noise, in expectation."""
-        return (self.weights * self.errors[:, 0] * self.errors[:, 1]).mean(1)
+        """[b] squared errors without noise, in expectation, but for the limit MOST_ERROR to both sides."""
+        return (self.weights * self.errors[:, 0] * self.errors[:, 1]).mean(1).clamp(-MOST_ERROR, MOST_ERROR)
 
 
 def is_worse(errors: np.ndarray, others: np.ndarray) -> bool:
