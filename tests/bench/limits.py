@@ -6,10 +6,10 @@ RUN is a run's folder or a GLB file with the recovered light in its folder; SCEN
 light.hdr and relit test views. With --out the scene's table is appended to a page, which is made where it is missing.
 
 The first and the last row are the files as they are; between them parts come from the nearest points of the other
-surface (tests/bench/swap.py). `all true` is the limit by noise and by the data's own renderer.
-
-With --sweeps N rows follow that say what the refinement makes of starts that are true in part: whether it stays at the
-truth, and whether a true part pulls the rest along. No outline is fitted, and all N sweeps are made.
+surface (tests/bench/swap.py). `all true` is the limit by noise and by the data's own renderer. Scores are those of
+`splitnerf evaluate`; novel views have a factor per channel, too; "less noise" is by two renderings, at most 50 dB.
+With --sweeps N rows follow that say what N sweeps of the refinement, without outline, make of starts that are true in
+part: whether it stays at the truth, and whether a true part pulls the rest along; give RUN/trained.
 """
 
 import argparse
@@ -58,19 +58,7 @@ COLUMNS = (
     ("metallic", "metal"),
     ("shading", "shading normals, deg"),
     ("smooth", "mesh's normals, deg"),
-    ("held", "held out, 1e-4"),
 )
-INTRODUCTION = """# What limits the relit images
-
-Parts of reconstructed assets are replaced by the truth at the nearest surface point, and every variant is path traced
-again. Relit: PSNR of the test views under the data's maps with one factor per channel, as `splitnerf evaluate` scores
-it; the same less the noise of the paths, which two renderings tell from errors that they share (but for what clipping
-makes of noise; at most 50 dB); and without the factor. Novel: PSNR of the photos under our light and under the true
-one, with one factor per channel too, since light and albedo share a scale. Then the errors of the maps against the
-truth: albedo in dB with one factor per channel, roughness as the mean absolute error, metal as the balanced accuracy,
-normals with and without the normal texture in degrees. Rows with sweeps are refined ones; held out is the error of
-photos that the refinement does not fit, before and after it.
-"""
 
 
 class Reseeded:
@@ -153,12 +141,12 @@ class Scene:
 
 
 def refined(photos: Dataset, asset: Asset, light: np.ndarray, sweeps: int) -> tuple[Asset, str]:
-    """What sweeps of the refinement make of an asset and a light, and the errors of photos held out before and after them."""
+    """What sweeps of the refinement make of an asset and a light, and the errors of photos held out before and after them, in 1e-4."""
     stage = Stage(photos, asset, light, FitSettings(sweeps=sweeps, outline=False, albedo_size=0))
     while len(stage.sweeps) < sweeps:
         stage.advance()
-    errors = stage.held_start, stage.sweeps[-1].held
-    return stage.fit.texels.asset_with(stage.fit.maps()), " to ".join(f"{1e4 * error:.2f}" for error in errors)
+    errors = f"{1e4 * stage.held_start:.2f} to {1e4 * stage.sweeps[-1].held:.2f}"
+    return stage.fit.texels.asset_with(stage.fit.maps()), errors
 
 
 def load_scene(root: Path, light: Path | None, truth: Asset, protocol: Protocol) -> Scene:
@@ -197,21 +185,19 @@ def section(run: Path, root: Path, protocol: Protocol, texture: int, sweeps: int
     photos, replaced = load_dataset(root, "train", protocol.downscale), dict(ROWS) | {"true light": ()}
     for name in STARTS if sweeps else ():
         parts = set(replaced[name])
-        canvas = canvases["true" if "mesh" in parts else "ours"]
-        start = canvas.painted(set(PARTS) - parts if "mesh" in parts else parts)
-        under = scene.lights["novel_true" if name in ("true light", "all true") else "novel"]
-        asset, held = refined(photos, start, under, sweeps)
-        lines.append(row(f"{name}, {sweeps} sweeps", scene.scores(asset) | {"held": held}))
+        start = canvases["true"].painted(set(PARTS) - parts) if "mesh" in parts else canvases["ours"].painted(parts)
+        light = scene.lights["novel_true" if name in ("true light", "all true") else "novel"]
+        asset, errors = refined(photos, start, light, sweeps)
+        lines.append(row(f"{name}, {sweeps} sweeps, held out {errors}", scene.scores(asset)))
         print(lines[-1], flush=True)
     text = "\n\n".join(lines[:3]) + "\n" + "\n".join(lines[3:])
     return f"{text}\n\n{header(provenance(SOURCES))}\n"
 
 
-def row(name: str, scores: dict[str, float | str | None]) -> str:
+def row(name: str, scores: dict[str, float | None]) -> str:
     """A line of the table."""
     digits = {"roughness": 3, "metallic": 3}
-    text = lambda key, value: value if isinstance(value, str) else f"{value:.{digits.get(key, 2)}f}"
-    cells = ["" if scores.get(key) is None else text(key, scores[key]) for key, _ in COLUMNS]
+    cells = ["" if scores.get(key) is None else f"{scores[key]:.{digits.get(key, 2)}f}" for key, _ in COLUMNS]
     return f"| {name} | {' | '.join(cells)} |"
 
 
@@ -228,7 +214,7 @@ def main() -> None:
     args = parser.parse_args()
     text = section(args.run, args.scene, Protocol(args.downscale, args.views, args.spp), args.texture, args.sweeps)
     if args.out is not None:
-        before = args.out.read_text() if args.out.is_file() else INTRODUCTION
+        before = args.out.read_text() if args.out.is_file() else "# What limits the relit images\n"
         args.out.write_text(f"{before}\n{text}")
 
 

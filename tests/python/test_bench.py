@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import torch
 from bench import operators, results, split_sum, tables
-from splitnerf.cli import DONE, main
 from splitnerf.config import parse_setting, preset
 from splitnerf_tools.bench import harness, provenance
 from splitnerf_tools.bench.charts import Chart, Point, Result, csv_rows, markdown, write_csv
@@ -137,7 +136,6 @@ class TestLights:
         assert torch.allclose(pyramid_of(light, 16)(axes, roughness), torch.full((30, 3), 2.0), rtol=1e-3)
 
     def test_the_lobes_integral(self):
-        """By quadrature over the cosine."""
         c = (torch.arange(200000, dtype=torch.float64) + 0.5) / 200000
         for rho in (0.2, 0.5, 0.9, 1.0):
             a2 = rho**4
@@ -152,16 +150,6 @@ def test_a_page_with_its_picture_and_points_is_written(tmp_path, monkeypatch, ca
     operators.main()
     assert {path.name for path in tmp_path.iterdir()} == {"shading.md", "shading.csv", "shading.png"}
     assert "as fast as torch eager" in capsys.readouterr().out
-
-
-def test_without_a_name_all_are_measured(monkeypatch):
-    asked = []
-    monkeypatch.setattr(harness, "run_benchmarks", lambda modules, *rest: asked.append(modules) or [])
-    assert main(["bench"]) == DONE
-    monkeypatch.setattr(sys, "argv", ["operators.py"])
-    operators.main()
-    pages = "prefilter", "occlusion"
-    assert asked == [[f"splitnerf_tools.bench.{name}" for name in pages], [f"bench.{name}" for name in operators.NAMES]]
 
 
 def test_lamps_and_the_rest_are_the_light():

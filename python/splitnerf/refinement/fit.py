@@ -56,14 +56,13 @@ LIKE = 0.5, 2.0  # differences of a texel's roughness and metallic from the usua
 ANCHOR = 0.02  # distance from the start
 SWEEPS_OF_LARGE_STEPS = 4  # afterwards the light's steps are half as large, to average over the noise of sweeps
 SWEEP_PIXELS = 1 << 18  # the most pixels of a sweep: more steps are worth more than more pixels
-LEAST_BATCHES = 8  # of a sweep, however short the time
-HELD_SEED = 1 << 30  # of the directions for pixels held out
+LEAST_BATCHES, HELD_SEED = 8, 1 << 30  # of a sweep, however short the time; of the directions for pixels held out
 # Factor on the error of held-out pixels: measured 1.0 to 1.4 on three objects; where the level was wrong 2.2 (porcelain), 4.0 (a casket), 5.1 (gold leaf).
 LEVEL_MAY_COST = 1.5
 PULL_MAY_COST = 1.01  # likewise: measured 1.00 to 1.01 on a teapot of one metal, to which the pull is worth 1 dB; 1.01 to 1.09 on three others
 SIGMAS = 2.0  # by which errors must be larger than others to be worse
-MIN_TONE = 0.02  # linear value below which errors weigh as at this one
-MOST_ERROR = 0.1  # that a pixel's squared error counts (0.3 of sRGB): the rare ray that finds a lamp by a mirror would decide alone
+# linear value below which errors weigh as at this one; most that a pixel's squared error counts: the rare ray that meets a lamp would decide alone
+MIN_TONE, MOST_ERROR = 0.02, 0.1
 
 
 @dataclass(frozen=True)
